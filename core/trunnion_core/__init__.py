@@ -1,0 +1,1 @@
+"""The nouns that the rooms of Trunnion pass to each other; no algorithms."""

@@ -1,0 +1,70 @@
+"""What one particular machine does: joint values, times and filament, row by row."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from trunnion_core.arrays import FloatArray, IntArray, check_array, freeze
+
+EventKind = Literal["nozzle_temperature", "bed_temperature", "wait_nozzle", "wait_bed", "fan", "layer", "pause"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happens just before `row` is executed; `value` in °C, fan duty 0 to 1, or a layer number."""
+
+    row: int
+    kind: EventKind
+    value: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class MachineProgram:
+    """Joint motion of one machine. Row i goes from joints[i-1] (row 0: from `start`) to joints[i], linear in joints."""
+
+    start: FloatArray
+    """(k,) mm or rad: where the joints stand before row 0."""
+    joints: FloatArray
+    """(n, k) mm or rad, in profile order."""
+    duration: FloatArray
+    """(n,) s that the row takes, as planned."""
+    filament: FloatArray
+    """(n,) mm of filament fed during the row; negative where it is retracted."""
+    role: IntArray
+    """(n,) values of `Role`; RETRACT and PRIME rows may stand still."""
+    layer: IntArray
+    """(n,)."""
+    width: FloatArray
+    """(n,) mm, 0 where no bead is laid."""
+    height: FloatArray
+    """(n,) mm, 0 where no bead is laid."""
+    tip_speed: FloatArray
+    """(n,) mm/s wanted of the tip over the part, from the toolpath; `duration` says what the axes allow."""
+    tip_length: FloatArray
+    """(n,) mm that the tip moves over the part during the row."""
+    source: IntArray
+    """(n,) row of the toolpath whose motion this is a part of; -1 for what motion inserted."""
+    events: tuple[Event, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        n, k = self.joints.shape
+        check_array("joints", self.joints, (n, k))
+        check_array("start", self.start, (k,))
+        per_row = (
+            "duration",
+            "filament",
+            "role",
+            "layer",
+            "width",
+            "height",
+            "tip_speed",
+            "tip_length",
+            "source",
+        )
+        for name in per_row:
+            check_array(name, getattr(self, name), (n,))
+        if n and self.duration.min() < 0:
+            raise ValueError(f"duration: row {int(self.duration.argmin())} is negative")
+        freeze(self.joints, self.start, *(getattr(self, name) for name in per_row))
+
+    def __len__(self) -> int:
+        return len(self.joints)

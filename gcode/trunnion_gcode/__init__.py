@@ -1,0 +1,1 @@
+"""The gcode room of Trunnion."""

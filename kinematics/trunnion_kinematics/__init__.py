@@ -1,0 +1,1 @@
+"""The kinematics room of Trunnion."""

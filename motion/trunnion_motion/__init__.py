@@ -1,0 +1,1 @@
+"""The motion room of Trunnion."""

@@ -1,0 +1,1 @@
+"""The slicer room of Trunnion."""
