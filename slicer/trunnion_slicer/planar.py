@@ -1,0 +1,168 @@
+"""A solid mesh becomes planar layers of unordered beads: walls, solid skins, infill.
+
+A layer is the section at the middle of its height, so that slopes are neither systematically too fat nor too thin.
+What is not covered by the sections of all of the next `top_solid_layers` layers, or does not rest on all of the last
+`bottom_solid_layers`, is solid; the rest of the inside gets the sparse pattern.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon
+from trunnion_core.arrays import FloatArray
+from trunnion_core.bead import bead_spacing, bead_width
+from trunnion_core.errors import MeshError, PlacementError
+from trunnion_core.layers import Bead, Layer
+from trunnion_core.mesh import Mesh
+from trunnion_core.roles import Role
+from trunnion_core.settings import PrintSettings
+
+from trunnion_slicer.beads import flat_bead
+from trunnion_slicer.infill import fill
+from trunnion_slicer.sections import sections
+from trunnion_slicer.skirt import skirt
+from trunnion_slicer.walls import as_multipolygon, offset, opened, walls
+
+FLOW_BAND = (0.8, 1.25)
+"""How far the bead of solid infill may depart from its nominal section so that an island gets exactly its volume."""
+
+SLIVER = 0.1
+"""mm. Exposed strips narrower than twice this are the stairs of a steep wall, which the walls cover."""
+
+NARROW_TOP = 3.0
+"""Spacings. Strips of top surface narrower than this are filled in one go with the solid infill beside them."""
+
+
+def planar_layers(mesh: Mesh, settings: PrintSettings) -> list[Layer]:
+    """Layers from the bed up, each bead's points on the layer's upper plane, the tool upright.
+
+    The mesh is solid and stands on z = 0. The first layer carries the skirt. Layers without material inside the part
+    stay, empty. Raises PlacementError when the part does not stand on the bed, MeshError when it is thinner than half
+    a layer, SettingsError for an unknown pattern.
+    """
+    tops, heights = _levels(mesh, settings)
+    slices = sections(mesh, tops - heights / 2)
+    if slices[0].is_empty:
+        raise MeshError("mesh: the first layer is empty, the part should have a surface to stand on at z = 0")
+    solid, top = _skins(slices, settings)
+    layers = []
+    for index, section in enumerate(slices):
+        z, height = float(tops[index]), float(heights[index])
+        width = settings.first_width if index == 0 else settings.extrusion_width
+        pass_ = _Pass(index, z, height, width, bead_spacing(width, height), settings)
+        beads = skirt(section, settings) if index == 0 else []
+        rings, inside = walls(section, settings.perimeters, width, pass_.spacing)
+        roles = [Role.OUTER_WALL if number == 0 else Role.INNER_WALL for number, _ in rings]
+        beads += [flat_bead(ring, z, width, height, role) for (_, ring), role in zip(rings, roles, strict=True)]
+        beads += _inside(inside, solid[index], top[index], pass_)
+        layers.append(Layer("planar", z, height, tuple(beads)))
+    return layers
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """What is the same for every bead inside one layer."""
+
+    index: int
+    z: float
+    height: float
+    width: float
+    spacing: float
+    settings: PrintSettings
+
+    @property
+    def angle(self) -> float:
+        """Direction of the infill in rad, turned by a quarter on every other layer."""
+        return float(np.radians(self.settings.fill_angle + 90.0 * (self.index % 2)))
+
+
+def _levels(mesh: Mesh, settings: PrintSettings) -> tuple[FloatArray, FloatArray]:
+    """Upper plane and height of every layer; the last is the last whose middle is inside the part."""
+    low, high = mesh.bounds[:, 2]
+    first, other = settings.first_height, settings.layer_height
+    if low < -first / 2 or low > first / 2:
+        raise PlacementError(f"part: its lowest point is at z = {low:.3f} mm, it should stand on the bed at z = 0")
+    if high <= first / 2:
+        raise MeshError(
+            f"part: it is {high - low:.3f} mm high, less than half the first layer of {first:g} mm: nothing to print"
+        )
+    count = 1 + max(0, int(np.ceil((high - first) / other - 0.5 - 1e-9)))
+    heights = np.full(count, other)
+    heights[0] = first
+    return np.asarray(first + other * np.arange(count), dtype=np.float64), heights
+
+
+def _skins(slices: list[MultiPolygon], settings: PrintSettings) -> tuple[list[MultiPolygon], list[MultiPolygon]]:
+    """Of every section: what has to be solid, and what of it faces up."""
+    here = np.array(slices, dtype=object)
+    open_above = [shapely.difference(here, cover) for cover in _covers(here, settings.top_solid_layers, up=True)]
+    open_below = [shapely.difference(here, cover) for cover in _covers(here, settings.bottom_solid_layers, up=False)]
+    nothing = np.full(len(here), MultiPolygon(), dtype=object)
+    solid = nothing
+    for exposed in (open_above[-1:], open_below[-1:]):
+        if exposed:
+            solid = shapely.union(solid, exposed[0])
+    top = open_above[0] if open_above else nothing
+    return [as_multipolygon(part) for part in solid], [as_multipolygon(part) for part in top]
+
+
+def _covers(here: "np.typing.NDArray[np.object_]", count: int, *, up: bool) -> list["np.typing.NDArray[np.object_]"]:
+    """What 1, 2, ... `count` neighbours on one side of every section have in common."""
+    covers: list[np.typing.NDArray[np.object_]] = []
+    for distance in range(1, min(count, len(here)) + 1):
+        neighbour = np.full(len(here), MultiPolygon(), dtype=object)
+        if up:
+            neighbour[:-distance] = here[distance:]
+        else:
+            neighbour[distance:] = here[:-distance]
+        covers.append(shapely.intersection(covers[-1], neighbour) if covers else neighbour)
+    return covers
+
+
+def _inside(inside: MultiPolygon, solid: MultiPolygon, top: MultiPolygon, pass_: _Pass) -> list[Bead]:
+    """Beads of everything within the walls of a layer."""
+    if inside.is_empty:
+        return []
+    settings = pass_.settings
+    if settings.fill_density >= 100:
+        solid_part, sparse = inside, MultiPolygon()
+    else:
+        exposed = opened(inside.intersection(solid), SLIVER)
+        sparse = opened(inside.difference(offset(exposed, pass_.width)), pass_.width)
+        solid_part = as_multipolygon(inside.difference(sparse)) if not exposed.is_empty else MultiPolygon()
+        sparse = inside if exposed.is_empty else sparse
+    upper = opened(inside.intersection(top), NARROW_TOP * pass_.spacing / 2)
+    under = opened(solid_part.difference(upper), pass_.spacing / 2) if not upper.is_empty else solid_part
+    upper = as_multipolygon(solid_part.difference(under)) if not upper.is_empty else upper
+    beads = _solid(upper, Role.TOP_SOLID_INFILL, pass_) + _solid(under, Role.SOLID_INFILL, pass_)
+    if settings.fill_density > 0 and not sparse.is_empty:
+        pitch = pass_.spacing * 100 / settings.fill_density
+        lines = fill(settings.fill_pattern, _line_area(sparse, pass_), pitch, pass_.angle, fit=False)
+        beads += [flat_bead(line, pass_.z, pass_.width, pass_.height, Role.INFILL) for line in lines]
+    return beads
+
+
+def _solid(region: MultiPolygon, role: Role, pass_: _Pass) -> list[Bead]:
+    """Beads that fill `region`; every island of lines gets the plastic of its area, within FLOW_BAND."""
+    beads = []
+    inset = _inset(pass_)
+    for island in _line_area(region, pass_).geoms:
+        lines = fill("rectilinear", MultiPolygon([island]), pass_.spacing, pass_.angle)
+        length = sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines)
+        if length == 0:
+            continue
+        flow = offset(island, inset).area / (length * pass_.spacing)
+        area = np.clip(flow, *FLOW_BAND) * pass_.spacing * pass_.height
+        width = float(bead_width(area, np.asarray(pass_.height)))
+        beads += [flat_bead(line, pass_.z, width, pass_.height, role) for line in lines]
+    return beads
+
+
+def _line_area(region: MultiPolygon, pass_: _Pass) -> MultiPolygon:
+    """Where the centre lines of infill may lie in `region`: half a bead inside, but for the overlap with the wall."""
+    return offset(region, -_inset(pass_))
+
+
+def _inset(pass_: _Pass) -> float:
+    return pass_.spacing / 2 - pass_.settings.infill_overlap / 100 * pass_.width
