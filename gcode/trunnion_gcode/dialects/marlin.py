@@ -1,0 +1,21 @@
+"""Marlin 2.1 with rotary axes, joints programmed directly (no G43.4).
+
+F is the length over X, Y and Z in mm; moves whose length there is under a micrometre count as rotary and F is in
+degrees (MarlinFirmware/Marlin `Planner::get_move_distance`, `UNEAR_ZERO` on the squared length). Moves of fewer than
+MIN_STEPS_PER_SEGMENT steps on every axis are measured over the filament. Arithmetic is in single precision.
+"""
+
+import functools
+
+from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.metrics import linear_first
+
+SHORTEST_LINEAR = 1e-3
+"""mm: the square root of Marlin's UNEAR_ZERO."""
+
+DIALECT = Dialect(
+    name="marlin",
+    metric=functools.partial(linear_first, threshold=SHORTEST_LINEAR),
+    shortest=2 * SHORTEST_LINEAR,
+    minimum_steps=6,
+)

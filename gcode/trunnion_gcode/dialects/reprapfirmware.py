@@ -1,0 +1,18 @@
+"""RepRapFirmware 3 on Duet boards: joint space, F over the linear axes if any of them moves, else in degrees.
+
+Duet3D/RepRapFirmware `DDA::InitStandardMove` follows NIST RS274NGC 2.1.2.5 rule A on the exact coordinates, then lifts
+the speed to the machine's minimum (30 mm/min unless M203 I says otherwise).
+"""
+
+from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.metrics import linear_first
+
+DIALECT = Dialect(
+    name="reprapfirmware",
+    metric=linear_first,
+    pause="M226",
+    max_line=200,
+    shortest=2e-3,
+    minimum_speed=0.5,
+    allow_slower="M203 I%s",
+)

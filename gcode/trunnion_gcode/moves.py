@@ -1,0 +1,168 @@
+"""A machine program becomes the moves that are written: rounded joint words, filament words, seconds.
+
+Rows whose words would not change are merged with the next row; so are rows too short for the firmware to read F right,
+as long as leaving out their end bends the path by no more than MERGE_DEVIATION.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.profile import MachineProfile
+from trunnion_core.program import MachineProgram
+from trunnion_core.roles import Role
+
+from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.words import carried_ticks, from_ticks, ticks
+
+MERGE_DEVIATION = 0.004
+"""mm or degrees. How far leaving out a point may bend the joints' path: below the chord tolerance of any print."""
+MERGE_PASSES = 6
+"""Each pass can halve the number of rows, so this merges up to 64 into one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """Move i ends what program row `row[i]` ends. Numbers are as a reader of the words gets them back."""
+
+    row: IntArray
+    """(m,) rows of the program, rising."""
+    joint_ticks: IntArray
+    """(m, k)."""
+    step: FloatArray
+    """(m, k) mm or degrees that each joint word changes by."""
+    filament_ticks: IntArray
+    """(m,)."""
+    filament: FloatArray
+    """(m,) mm."""
+    seconds: FloatArray
+    """(m,) planned."""
+    metric: FloatArray
+    """(m,) length over which the firmware reads F."""
+
+
+def make_moves(program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> Moves:
+    """Round, merge and measure. GcodeError names the row and joint of a number that cannot be written."""
+    decimals = joint_decimals(profile)
+    shown = program.joints * profile.to_shown
+    words = np.stack(
+        [ticks(joint.letter, shown[:, k], decimals[k]) for k, joint in enumerate(profile.joints)], axis=1
+    ).reshape(len(program), len(profile.joints))
+    start = np.array(
+        [
+            ticks(f"start {joint.letter}", np.array([joint.shown(program.start[k])]), decimals[k])[0]
+            for k, joint in enumerate(profile.joints)
+        ]
+    )
+    kept = _written(program, words, start)
+    merged_deviation = np.zeros(len(program))
+    for _ in range(MERGE_PASSES):
+        if not _merge_once(kept, merged_deviation, program, words, start, profile, dialect):
+            break
+    return _measured(kept, program, words, start, profile, dialect)
+
+
+def joint_decimals(profile: MachineProfile) -> list[int]:
+    """Decimals of every joint's word, in profile order."""
+    table = profile.gcode
+    return [table.decimals_rotary if joint.rotary else table.decimals_linear for joint in profile.joints]
+
+
+def _written(program: MachineProgram, words: IntArray, start: IntArray) -> BoolArray:
+    """(n,) rows that need a line: a word changes, or filament moves while the joints are meant to stand."""
+    moves = (np.diff(words, axis=0, prepend=start[None]) != 0).any(axis=1)
+    stands = (np.diff(program.joints, axis=0, prepend=program.start[None]) == 0).all(axis=1)
+    filament_only = (program.filament != 0) & (stands | (program.role == Role.RETRACT) | (program.role == Role.PRIME))
+    return np.asarray(moves | filament_only)
+
+
+def _merge_once(
+    kept: BoolArray,
+    deviation: FloatArray,
+    program: MachineProgram,
+    words: IntArray,
+    start: IntArray,
+    profile: MachineProfile,
+    dialect: Dialect,
+) -> bool:
+    """Leave out ends of rows too short for F, never two neighbours in one pass; whether any was left out.
+
+    `deviation` bounds how far what was left out lies from the path: old chord to point plus new chord to old chord.
+    """
+    moves = _measured(kept, program, words, start, profile, dialect)
+    rows = moves.row
+    if len(rows) < 3:
+        return False
+    length = moves.metric
+    steps_per_shown = np.array([joint.steps_per_unit for joint in profile.joints]) / profile.to_shown
+    few_steps = (np.abs(moves.step) * steps_per_shown < dialect.minimum_steps).all(axis=1)
+    moving = (moves.step != 0).any(axis=1)
+    short = moving & ((length < dialect.shortest) | few_steps)
+    here, there = rows[:-1], rows[1:]
+    event_rows = np.unique([event.row for event in program.events]).astype(np.int64)
+    event_between = np.searchsorted(event_rows, there, "right") > np.searchsorted(event_rows, here, "right")
+    alike = (
+        (program.role[here] == program.role[there])
+        & (program.layer[here] == program.layer[there])
+        & (program.tip_speed[here] == program.tip_speed[there])
+        & moving[:-1]
+        & moving[1:]
+        & ~event_between
+    )
+    bend = np.maximum(deviation[here], deviation[there]) + _distance_from_chord(moves.step)
+    candidate = (short[:-1] | short[1:]) & alike & (bend <= MERGE_DEVIATION)
+    chosen = _no_neighbours(candidate)
+    if not chosen.any():
+        return False
+    kept[here[chosen]] = False
+    deviation[there[chosen]] = bend[chosen]
+    return True
+
+
+def _distance_from_chord(step: FloatArray) -> FloatArray:
+    """(m - 1,) distance of the end of move i from the straight line that moves i and i + 1 make together."""
+    first, second = step[:-1], step[1:]
+    chord = first + second
+    square = np.einsum("ij,ij->i", chord, chord)
+    along = np.clip(np.einsum("ij,ij->i", first, chord) / np.where(square > 0, square, 1.0), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(first - along[:, None] * chord, axis=1))
+
+
+def _no_neighbours(candidate: BoolArray) -> BoolArray:
+    """Every other one of each run of candidates, starting with its first."""
+    index = np.arange(len(candidate))
+    run_start = np.maximum.accumulate(np.where(candidate & ~np.roll(candidate, 1), index, 0))
+    return np.asarray(candidate & ((index - run_start) % 2 == 0))
+
+
+def _measured(
+    kept: BoolArray,
+    program: MachineProgram,
+    words: IntArray,
+    start: IntArray,
+    profile: MachineProfile,
+    dialect: Dialect,
+) -> Moves:
+    """The moves that end at kept rows; each takes the seconds and filament of the rows merged into it.
+
+    Filament never lands on a row that is a travel: its remainder waits for the next row that feeds.
+    """
+    rows = np.flatnonzero(kept)
+    joint_ticks = words[rows]
+    scale = 10.0 ** np.array(joint_decimals(profile))
+    step = np.diff(joint_ticks, axis=0, prepend=start[None]) / scale
+    feeding = np.flatnonzero(~np.isin(program.role[rows], (Role.TRAVEL, Role.LINK)))
+    filament_ticks = np.zeros(len(rows), dtype=np.int64)
+    fed = np.diff(np.cumsum(program.filament)[rows[feeding]], prepend=0.0)
+    filament_ticks[feeding] = carried_ticks(dialect.extruder, fed, profile.gcode.decimals_extruder)
+    filament = from_ticks(filament_ticks, profile.gcode.decimals_extruder)
+    rotary = np.array([joint.rotary for joint in profile.joints])
+    return Moves(
+        row=rows,
+        joint_ticks=joint_ticks,
+        step=step,
+        filament_ticks=filament_ticks,
+        filament=filament,
+        seconds=np.diff(np.cumsum(program.duration)[rows], prepend=0.0),
+        metric=dialect.metric(step[:, ~rotary], step[:, rotary], filament),
+    )
