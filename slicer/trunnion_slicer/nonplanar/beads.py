@@ -1,0 +1,74 @@
+"""Surfaces become beads: flat paths lifted, with the width that makes every piece's volume that of its place."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from shapely.geometry import MultiPolygon
+
+from trunnion_core.arrays import FloatArray, IntArray
+from trunnion_core.bead import bead_width
+from trunnion_core.layers import Bead
+from trunnion_core.settings import PrintSettings
+from trunnion_slicer.nonplanar.footprint import footprint
+from trunnion_slicer.nonplanar.grid import Grid, build_grid
+from trunnion_slicer.nonplanar.offset import Surfaces
+from trunnion_slicer.nonplanar.orient import corner_normals, smoothed
+from trunnion_slicer.nonplanar.paths import FlatPath, flat_paths
+from trunnion_slicer.nonplanar.project import Lifted, lift
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """The upper surface of one layer of one patch, ready to be drawn on."""
+
+    stack: Surfaces
+    layer: int
+    """0 is the outermost."""
+    grid: Grid
+    outline: MultiPolygon
+
+    @property
+    def top(self) -> float:
+        """mm, its highest point."""
+        return float(self.stack.surfaces[self.layer][:, 2].max())
+
+
+def sheet(stack: Surfaces, layer: int) -> Sheet:
+    """Layer `layer` of a stack, 0 the outermost."""
+    surface = stack.surfaces[layer]
+    grid = build_grid(surface[stack.patch.faces])
+    return Sheet(stack, layer, grid, footprint(surface, stack.patch.border, grid))
+
+
+def beads_of(on: Sheet, settings: PrintSettings) -> list[Bead]:
+    """Every bead of a layer on one patch: walls, then infill."""
+    paths = flat_paths(on.stack, on.layer, on.outline, settings)
+    if not paths:
+        return []
+    faces = on.stack.patch.faces
+    density = on.stack.densities(on.layer)
+    lines = [path.points for path in paths]
+    lifted = lift(lines, on.grid, corner_normals(on.stack.patch), density[faces], settings.extrusion_width)
+    axes = smoothed(lifted.points, lifted.axes, lifted.starts, float(np.radians(settings.nonplanar_smoothing)))
+    height = np.full(len(axes), settings.layer_height)
+    if settings.nonplanar_tool_axis == "vertical":
+        height = height / np.maximum(lifted.axes[:, 2], 0.1)
+        axes = np.tile([0.0, 0.0, 1.0], (len(axes), 1))
+    return _beads(paths, lifted, axes, height)
+
+
+def _beads(paths: Sequence[FlatPath], lifted: Lifted, axes: FloatArray, height: FloatArray) -> list[Bead]:
+    starts = lifted.starts
+    length = np.zeros(len(axes))
+    length[1:] = np.linalg.norm(np.diff(lifted.points, axis=0), axis=1)
+    share = np.repeat([path.share for path in paths], np.diff(starts))
+    area = lifted.volume * share / np.maximum(length, 1e-9)
+    first: IntArray = starts[:-1]
+    area[first] = area[np.minimum(first + 1, len(area) - 1)]
+    width = bead_width(area, height)
+    return [
+        Bead(lifted.points[a:b], axes[a:b], width[a:b], height[a:b], path.role)
+        for path, a, b in zip(paths, starts[:-1], starts[1:], strict=True)
+        if b - a >= 2
+    ]

@@ -1,0 +1,124 @@
+"""Averaged normals become the directions that the tool takes along paths.
+
+On a smooth surface the averaged normals, interpolated over each facet, are the tool axis. At a crease they are not: on
+a large flat facet they would lean towards the crease all over it. So a corner's normal averages only the facets that
+are nearly parallel to its own, and along a path that crosses the crease the tool turns over a short way.
+"""
+
+import numpy as np
+
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_slicer.nonplanar.normals import corner_angles, face_normals
+from trunnion_slicer.nonplanar.patch import Patch
+
+CREASE_DEG = 20.0
+"""Degrees between facets from which on each keeps its own normal at their common corner."""
+
+PASSES = 128
+"""Rounds of smoothing: the tool's turns spread over about a dozen points of the path."""
+
+
+def corner_normals(patch: Patch) -> FloatArray:
+    """(m, 3, 3) unit: at every corner the angle-weighted mean of the normals within CREASE_DEG of its facet's."""
+    faces = patch.faces
+    normal, _ = face_normals(patch.vertices, faces)
+    corners = patch.normals[faces]
+    off = (corners * normal[:, None]).sum(axis=2) < np.cos(np.radians(CREASE_DEG / 2))
+    creased = np.zeros(len(patch.vertices), np.bool_)
+    creased[faces[off]] = True
+    around = np.flatnonzero(creased[faces].ravel())
+    if not around.size:
+        return corners
+    vertex = faces.ravel()[around]
+    order = np.argsort(vertex, kind="stable")
+    around, vertex = around[order], vertex[order]
+    first = np.searchsorted(vertex, vertex, side="left")
+    valence = np.searchsorted(vertex, vertex, side="right") - first
+    mine = np.repeat(np.arange(len(around)), valence)
+    other = first[mine] + np.arange(len(mine)) - np.repeat(np.cumsum(valence) - valence, valence)
+    mine_normal, other_normal = normal[around[mine] // 3], normal[around[other] // 3]
+    alike = (mine_normal * other_normal).sum(axis=1) >= np.cos(np.radians(CREASE_DEG))
+    weight = corner_angles(patch.vertices, faces).ravel()[around[other]] * alike
+    total = [np.bincount(mine, weight * other_normal[:, axis], len(around)) for axis in range(3)]
+    summed = np.stack(total, axis=1)
+    corners = corners.reshape(-1, 3)
+    corners[around] = summed / np.linalg.norm(summed, axis=1, keepdims=True)
+    return corners.reshape(-1, 3, 3)
+
+
+def spread_jumps(
+    points: FloatArray, axes: FloatArray, density: FloatArray, starts: IntArray, jump: BoolArray, blend: float
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+    """Turn the tool evenly over `blend` mm before and behind every row where its axis jumps.
+
+    points (n, 3), axes (n, 3), density (n,) of paths starts[i] : starts[i + 1]; rows are added where the turning
+    begins and ends.
+    """
+    if not jump.any():
+        return points, axes, density, starts
+    along = np.zeros(len(points))
+    along[1:] = np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))
+    low = np.repeat(along[starts[:-1]], np.diff(starts))
+    high = np.repeat(along[starts[1:] - 1], np.diff(starts))
+    gap = np.repeat(np.arange(len(starts) - 1) * 4 * blend, np.diff(starts))
+    along, low, high = along + gap, low + gap, high + gap
+
+    centre = along[jump]
+    before, behind = np.maximum(centre - blend, low[jump]), np.minimum(centre + blend, high[jump])
+    added = np.unique(np.concatenate([before, behind]))
+    nearest = np.clip(np.searchsorted(along, added), 1, len(along) - 1)
+    distance = np.minimum(np.abs(along[nearest] - added), np.abs(along[nearest - 1] - added))
+    added = added[distance > 1e-3]
+    place = np.searchsorted(along, added)
+    values = np.column_stack([points, axes, density])
+    between = np.stack([np.interp(added, along, column) for column in values.T], axis=1)
+    values = np.insert(values, place, between, axis=0)
+    turned = np.insert(along, place, added)
+
+    # Rows within reach of a jump take the axis between those at the two ends of its reach.
+    ends = np.stack([[np.interp(s, along, axis) for axis in axes.T] for s in (before, behind)])
+    right = np.clip(np.searchsorted(centre, turned), 0, len(centre) - 1)
+    left = np.maximum(right - 1, 0)
+    near = np.where(np.abs(centre[left] - turned) < np.abs(centre[right] - turned), left, right)
+    inside = (turned > before[near]) & (turned < behind[near])
+    which = near[inside]
+    t = ((turned[inside] - before[which]) / (behind[which] - before[which]))[:, None]
+    values[inside, 3:6] = (1 - t) * ends[0].T[which] + t * ends[1].T[which]
+    values[:, 3:6] /= np.linalg.norm(values[:, 3:6], axis=1, keepdims=True)
+    moved = starts + np.searchsorted(place, starts, side="left")
+    return values[:, :3], values[:, 3:6], values[:, 6], moved
+
+
+def smoothed(points: FloatArray, axes: FloatArray, starts: IntArray, tolerance: float) -> FloatArray:
+    """Axes (n, 3) that turn as evenly along the paths as a cone of `tolerance` rad about the given ones lets them.
+
+    Each round moves every axis to the mean of its neighbours on the path, weighted by how near they are, and back
+    into its cone along the great circle. Ends of open paths follow their one neighbour.
+    """
+    if tolerance <= 0 or len(points) < 2:
+        return axes
+    distance = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    weight = 1 / np.maximum(distance, 1e-3)
+    weight[starts[1:-1] - 1] = 0.0
+    back = np.concatenate([[0.0], weight])[:, None]
+    ahead = np.concatenate([weight, [0.0]])[:, None]
+    first, last = starts[:-1], starts[1:] - 1
+    loop = (points[first] == points[last]).all(axis=1)
+    now = axes
+    for _ in range(PASSES):
+        pulled = 1e-12 * now
+        pulled[1:] += back[1:] * now[:-1]
+        pulled[:-1] += ahead[:-1] * now[1:]
+        pulled[first[loop]] = pulled[last[loop]] = pulled[first[loop]] + pulled[last[loop]]
+        pulled /= np.linalg.norm(pulled, axis=1, keepdims=True)
+        now = _into_cone((now + pulled) / np.linalg.norm(now + pulled, axis=1, keepdims=True), axes, tolerance)
+    return now
+
+
+def _into_cone(axes: FloatArray, centres: FloatArray, tolerance: float) -> FloatArray:
+    """Axes moved along great circles to within `tolerance` rad of their centres."""
+    cosine = np.clip((axes * centres).sum(axis=1, keepdims=True), -1.0, 1.0)
+    side = axes - cosine * centres
+    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-300)
+    on_edge = np.cos(tolerance) * centres + np.sin(tolerance) * side
+    return np.where(cosine < np.cos(tolerance), on_edge, axes)

@@ -1,0 +1,122 @@
+"""Flat paths become beads' paths on a surface: cut at the triangles' edges, lifted, turned, thinned out.
+
+Section 2.11 of Shahid 2024: a path bends only where it crosses an edge, so points there (and nowhere else) follow
+the surface exactly. Each piece between two points lies in one triangle and takes height, tool axis and thickness
+from it; at a point, both pieces have a say. Points that do not matter are then dropped.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from trunnion_core.arrays import FloatArray, IntArray, freeze
+from trunnion_slicer.nonplanar.grid import Grid
+from trunnion_slicer.nonplanar.orient import spread_jumps
+from trunnion_slicer.nonplanar.thin_kernel import thinned
+
+CHORD = 0.003
+"""mm. How far a point may lie off the line between its neighbours and still be dropped."""
+
+AXIS_CHORD = 0.009
+"""Half a degree: how far its tool axis may be off the interpolated one."""
+
+DENSITY_CHORD = 0.03
+"""Share by which the layer's thickness at it may be off the interpolated one."""
+
+SHORTEST = 0.05
+"""mm. Of points nearer than this to each other one is enough: less than the nozzle's flat can follow."""
+
+CREASE_JUMP = 0.035
+"""Two degrees: a larger step of the tool axis at a point is spread over the path before and behind it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lifted:
+    """Paths on a surface: path i is rows starts[i] : starts[i + 1]."""
+
+    points: FloatArray
+    """(n, 3) mm."""
+    axes: FloatArray
+    """(n, 3) unit, the averaged normals."""
+    volume: FloatArray
+    """(n,) mm³ per mm of share of the piece that ends at the row, 0 in the first row of a path."""
+    starts: IntArray
+    """(paths + 1,)"""
+
+    def __post_init__(self) -> None:
+        freeze(self.points, self.axes, self.volume, self.starts)
+
+
+def lift(
+    lines: Sequence[FloatArray], grid: Grid, corner_normals: FloatArray, corner_density: FloatArray, blend: float
+) -> Lifted:
+    """Polylines (n, 2) mm on the surface of `grid`.
+
+    corner_normals (m, 3, 3) unit and corner_density (m, 3) mm belong to the corners of the grid's triangles. Where
+    the normal jumps at an edge, the tool turns over `blend` mm before and behind it.
+    """
+    flat = np.concatenate(lines) if lines else np.zeros((0, 2))
+    starts = np.concatenate([[0], np.cumsum([len(line) for line in lines])]).astype(np.int64)
+    flat, starts = grid.cut(flat, starts)
+    points, axes, density, starts = _evaluate(flat, starts, grid, corner_normals, corner_density, blend)
+    run = np.zeros(len(points))
+    run[1:] = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1) * (density[1:] + density[:-1]) / 2
+    run[starts[:-1]] = 0.0
+    keep = thinned(points, axes, density, starts, CHORD, AXIS_CHORD, DENSITY_CHORD, SHORTEST)
+    rows = np.flatnonzero(keep)
+    total = np.cumsum(run)
+    volume = np.diff(total[rows], prepend=0.0)
+    new_starts = np.searchsorted(rows, starts)
+    volume[new_starts[:-1]] = 0.0
+    return Lifted(points[rows], axes[rows], volume, new_starts)
+
+
+def _evaluate(
+    flat: FloatArray,
+    starts: IntArray,
+    grid: Grid,
+    corner_normals: FloatArray,
+    corner_density: FloatArray,
+    blend: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+    """Points, axes, densities and starts of paths whose pieces each lie over one triangle."""
+    count = len(flat)
+    into = np.ones(count, np.bool_)  # whether a piece ends at the row
+    into[starts[:-1]] = False
+    end = np.flatnonzero(into)
+    triangle, _ = grid.locate((flat[end] + flat[end - 1]) / 2)
+    values = np.zeros((count, 5))
+    says = np.zeros(count)
+    jump = np.zeros((count, 3))
+    for row, sign in ((end - 1, 1.0), (end, -1.0)):
+        weights = _weights(flat[row], grid.triangles[triangle])
+        height = (weights * grid.triangles[triangle][:, :, 2]).sum(axis=1)
+        normal = np.einsum("nk,nkd->nd", weights, corner_normals[triangle])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        density = (weights * corner_density[triangle]).sum(axis=1)
+        values[row] += np.column_stack([height, normal, density])
+        says[row] += 1
+        jump[row] += sign * normal
+    first, last = starts[:-1], starts[1:] - 1
+    closed = (flat[first] == flat[last]).all(axis=1)
+    both = values[first[closed]] + values[last[closed]]
+    values[first[closed]] = values[last[closed]] = both / 2
+    values /= np.maximum(says, 1.0)[:, None]
+    points = np.column_stack([flat, values[:, 0]])
+    axes = values[:, 1:4] / np.linalg.norm(values[:, 1:4], axis=1, keepdims=True)
+    crease = (says == 2) & (np.linalg.norm(jump, axis=1) > CREASE_JUMP)
+    return spread_jumps(points, axes, values[:, 4], starts, crease, blend)
+
+
+def _weights(points: FloatArray, triangles: FloatArray) -> FloatArray:
+    """Barycentric coordinates (n, 3) of points (n, 2) in triangles (n, 3, 3) from above, a little way beyond at most."""
+    a = triangles[:, 1, :2] - triangles[:, 0, :2]
+    b = triangles[:, 2, :2] - triangles[:, 0, :2]
+    q = points - triangles[:, 0, :2]
+    area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    safe = np.where(np.abs(area) > 1e-14, area, 1.0)
+    v = (q[:, 0] * b[:, 1] - q[:, 1] * b[:, 0]) / safe
+    w = (a[:, 0] * q[:, 1] - a[:, 1] * q[:, 0]) / safe
+    weights = np.clip(np.stack([1 - v - w, v, w], axis=1), -0.2, 1.2)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
