@@ -19,7 +19,7 @@ from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 
 from trunnion_slicer.beads import flat_bead
-from trunnion_slicer.infill import fill
+from trunnion_slicer.infill import fill, require
 from trunnion_slicer.sections import sections
 from trunnion_slicer.skirt import skirt
 from trunnion_slicer.walls import as_multipolygon, offset, opened, walls
@@ -41,6 +41,7 @@ def planar_layers(mesh: Mesh, settings: PrintSettings) -> list[Layer]:
     stay, empty. Raises PlacementError when the part does not stand on the bed, MeshError when it is thinner than half
     a layer, SettingsError for an unknown pattern.
     """
+    require(settings.fill_pattern)
     tops, heights = _levels(mesh, settings)
     slices = sections(mesh, tops - heights / 2)
     if slices[0].is_empty:

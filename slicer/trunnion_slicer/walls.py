@@ -19,6 +19,13 @@ MITRE_LIMIT = 2.0
 """Corners sharper than about 60 degrees are bevelled where a wall goes round their outside."""
 
 
+SAME_AREA = 1e-3
+"""mm². Places too narrow for two runs are larger than this."""
+
+GRID = 1e-6
+"""mm. Overlaying two outlines that nearly coincide leaves points closer than this, which are one point."""
+
+
 def walls(
     region: Polygon | MultiPolygon, count: int, width: float, spacing: float
 ) -> tuple[list[tuple[int, FloatArray]], MultiPolygon]:
@@ -45,7 +52,8 @@ def wall_lines(region: MultiPolygon, count: int, width: float, spacing: float) -
 
 def offset(region: BaseGeometry, distance: float) -> MultiPolygon:
     """The region grown by `distance` mm with mitred corners; shrunk where negative."""
-    return as_multipolygon(region.buffer(distance, join_style="mitre", mitre_limit=MITRE_LIMIT))
+    with np.errstate(divide="ignore", invalid="ignore"):  # GEOS divides by zero at collinear corners, and recovers
+        return as_multipolygon(region.buffer(distance, join_style="mitre", mitre_limit=MITRE_LIMIT))
 
 
 def opened(region: BaseGeometry, radius: float) -> MultiPolygon:
@@ -65,7 +73,11 @@ def as_multipolygon(region: BaseGeometry) -> MultiPolygon:
 
 def _fitting(region: MultiPolygon, distance: float, margin: float) -> MultiPolygon:
     """`region` shrunk by `distance`, without the places narrower than 2 `margin` after that."""
-    return offset(offset(region, -(distance + margin)), margin)
+    shrunk = offset(region, -distance)
+    wide = offset(offset(region, -(distance + margin)), margin)
+    if abs(shrunk.area - wide.area) < SAME_AREA:
+        return shrunk
+    return as_multipolygon(shapely.intersection(shrunk, wide, grid_size=GRID))
 
 
 def _rings(region: MultiPolygon) -> list[FloatArray]:

@@ -25,16 +25,17 @@ def fill(pattern: str, region: MultiPolygon, spacing: float, angle: float, *, fi
     from edge to edge, their distance as near to `spacing` as that allows; without, lines lie on multiples of
     `spacing` from the origin, the same on every layer. Raises SettingsError for an unknown pattern.
     """
-    return _pattern(pattern)(region, spacing, angle, fit=fit)
+    require(pattern)
+    lay: Fill = import_module(f"{__name__}.{pattern}").fill
+    return lay(region, spacing, angle, fit=fit)
+
+
+def require(pattern: str) -> None:
+    """Raise SettingsError, which names the nearest, unless there is such a pattern."""
+    if pattern not in patterns():
+        raise SettingsError("settings", [f"fill_pattern: '{pattern}' is unknown, {nearest(pattern, patterns())}"])
 
 
 def patterns() -> list[str]:
     """Every pattern there is, sorted."""
     return sorted(file.stem for file in Path(__file__).parent.glob("*.py") if not file.stem.startswith("_"))
-
-
-def _pattern(name: str) -> Fill:
-    if name not in patterns():
-        raise SettingsError("settings", [f"fill_pattern: '{name}' is unknown, {nearest(name, patterns())}"])
-    found: Fill = import_module(f"{__name__}.{name}").fill
-    return found
