@@ -25,3 +25,5 @@ class Finding:
     value: float | None = None
     limit: float | None = None
     point: tuple[float, float, float] | None = None
+    count: int = 1
+    """How many rows in a row this finding stands for; the fields are those of the worst."""

@@ -1,0 +1,1 @@
+"""One check a file; each exposes CODES (code to severity and meaning) and check(context)."""

@@ -1,0 +1,166 @@
+"""Everything a check may look at, computed once, and how it turns rows into findings."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.findings import Finding, Severity
+from trunnion_core.profile import Joint, MachineProfile
+from trunnion_core.roles import Role
+
+from trunnion_sim import motion_kernel
+from trunnion_sim.chain import forward
+from trunnion_sim.limits import Limits
+from trunnion_sim.motion import Motion
+from trunnion_sim.notes import Notes, RowNotes
+from trunnion_sim.reader import FileEnd
+from trunnion_sim.replay import Replay, pieces, samples
+from trunnion_sim.rules import Rules
+
+TURN_STEP = math.radians(1.0)
+"""rad that a rotary turns between two looks inside a row: 0.006 mm of arc height at 150 mm from the pivot."""
+GAP = 3
+"""Rows between two offending rows that still belong to one finding."""
+MOST = 40
+"""Findings of one code that are listed; the last one stands for all the rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class LineOddities:
+    """What the reader found odd, before any meaning."""
+
+    lines: IntArray
+    """(m,)."""
+    flags: IntArray
+    """(m,) bits of `reader_kernel`."""
+    length: IntArray
+    """(m,) bytes."""
+    longest: tuple[int, int]
+    """Line and bytes of the longest command."""
+    letters: dict[str, int]
+    """Letters of words on motion commands: first line of each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """One judged program. Rows are those of `motion`."""
+
+    profile: MachineProfile
+    rules: Rules
+    motion: Motion
+    notes: Notes
+    rows: RowNotes
+    limits: Limits
+    replay: Replay
+    points: FloatArray
+    """(n, 3) mm, tip in `part` at the end of each row."""
+    tool_axes: FloatArray
+    """(n, 3)."""
+    oddities: LineOddities
+    end: FileEnd
+
+    @cached_property
+    def moved(self) -> BoolArray:
+        """(n,) whether a joint moves on the row."""
+        return np.asarray((np.abs(self.motion.joints - self.motion.before) > 1e-9).any(axis=1))
+
+    @cached_property
+    def homing(self) -> BoolArray:
+        """(n,) whether the row is a homing."""
+        return np.asarray(self.motion.kind == motion_kernel.HOME)
+
+    @cached_property
+    def homed(self) -> BoolArray:
+        """(n,) whether every joint was homed when the row ran."""
+        every = (1 << len(self.profile.joints)) - 1
+        return np.asarray((self.motion.homed & every) == every)
+
+    @cached_property
+    def feeds(self) -> BoolArray:
+        """(n,) whether the row moves and lays plastic."""
+        return self.moved & ~self.homing & (self.motion.filament > 0)
+
+    @cached_property
+    def inside(self) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Rows (m,), tip (m, 3) and tool axis (m, 3) along the motion, so close that arcs drawn by rotaries are seen."""
+        rows, fractions = pieces(self.motion, self.profile, TURN_STEP)
+        whole = fractions >= 1.0
+        points, axes = self.points[rows], self.tool_axes[rows]
+        if not whole.all():
+            points[~whole], axes[~whole] = forward(self.profile, samples(self.motion, rows[~whole], fractions[~whole]))
+        return rows, points, axes
+
+    @cached_property
+    def tip_length(self) -> FloatArray:
+        """(n,) mm that the tip travels over the part on each row, arcs followed."""
+        rows, points, _ = self.inside
+        if not len(rows):
+            return np.zeros(0)
+        start, _ = forward(self.profile, self.motion.start[None])
+        steps = np.linalg.norm(np.diff(points, axis=0, prepend=start), axis=1)
+        return np.asarray(np.bincount(rows, weights=steps, minlength=len(self.motion)), dtype=np.float64)
+
+    def find(
+        self,
+        code: str,
+        severity: Severity,
+        mask: BoolArray,
+        message: Callable[[int], str],
+        *,
+        value: FloatArray | None = None,
+        limit: FloatArray | float | None = None,
+        joint: Joint | None = None,
+    ) -> Iterator[Finding]:
+        """A finding for every run of offending rows, at its worst row; beyond MOST the rest becomes one.
+
+        Values of a joint are given in internal units and shown in mm or degrees. The worst row is the one where
+        `value` is farthest from `limit`, or the first.
+        """
+        hit = np.flatnonzero(mask)
+        if not hit.size:
+            return
+        starts = np.concatenate([[0], np.flatnonzero(np.diff(hit) > GAP) + 1])
+        if len(starts) > MOST:
+            starts = starts[:MOST]
+        ends = np.append(starts[1:], len(hit))
+        excess = None
+        if value is not None:
+            excess = np.abs(value[hit] - (0.0 if limit is None else np.broadcast_to(limit, mask.shape)[hit]))
+        for first, last in zip(starts.tolist(), ends.tolist(), strict=True):
+            worst = int(hit[first if excess is None else first + int(excess[first:last].argmax())])
+            count = last - first
+            text = message(worst)
+            if count > 1:
+                text += f" ({count} rows, lines {self.motion.line[hit[first]]} to {self.motion.line[hit[last - 1]]})"
+            shown = joint.shown if joint is not None else float
+            yield Finding(
+                code=code,
+                severity=severity,
+                message=text,
+                line=int(self.motion.line[worst]),
+                row=worst,
+                layer=self.layer(worst),
+                axis=None if joint is None else joint.letter,
+                value=None if value is None else float(shown(float(value[worst]))),
+                limit=None if limit is None else float(shown(float(np.broadcast_to(limit, mask.shape)[worst]))),
+                point=self.point(worst),
+                count=count,
+            )
+
+    def point(self, row: int) -> tuple[float, float, float]:
+        """Tip at the end of a row, mm in `part`."""
+        x, y, z = self.points[row].tolist()
+        return x, y, z
+
+    def layer(self, row: int) -> int | None:
+        """Layer of a row; None before the first."""
+        layer = int(self.rows.layer[row])
+        return layer if layer >= 0 else None
+
+    def role_text(self, row: int) -> str:
+        """Role of a row for messages."""
+        role = int(self.rows.role[row])
+        return Role(role).text.replace("_", " ") if role >= 0 else "unnamed"

@@ -1,0 +1,1 @@
+"""Rules of execution, one firmware a file."""

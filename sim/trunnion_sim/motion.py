@@ -1,0 +1,179 @@
+"""Turn blocks of commands into executed motions: modal state, units, offsets, homing, arcs.
+
+Every motion row ends in joint values; non-motion commands are kept beside, each with the row before which it stands.
+The state machine runs over the words in one compiled loop and is carried from block to block.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.profile import MachineProfile
+
+from trunnion_sim import motion_kernel as kernel
+from trunnion_sim.reader import Block
+from trunnion_sim.rules import Rules
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command that is no motion; it takes effect before `row`."""
+
+    line: int
+    row: int
+    letter: str
+    code: int
+    """Ten times the number."""
+    words: tuple[tuple[str, float], ...]
+
+    def get(self, letter: str) -> float | None:
+        """The value of a word; None where it is missing or bare."""
+        for name, value in self.words:
+            if name == letter and not math.isnan(value):
+                return value
+        return None
+
+    @property
+    def name(self) -> str:
+        """As people write it: G43.4."""
+        return code_name(self.letter, self.code)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What the program tells the machine to do, one row per motion."""
+
+    line: IntArray
+    """(n,) line in the file, from 1."""
+    kind: NDArray[np.uint8]
+    """(n,) of `motion_kernel`: RAPID, LINEAR, ARC, HOME."""
+    start: FloatArray
+    """(k,) mm or rad: where the joints are taken to stand at the start."""
+    joints: FloatArray
+    """(n, k) mm or rad at the end of the row."""
+    filament: FloatArray
+    """(n,) mm fed, after M221."""
+    feed: FloatArray
+    """(n,) mm/s or deg/s as the F word in force says, after M220; with `inverse`, 1/s."""
+    inverse: BoolArray
+    """(n,) whether the feed is G93 inverse time."""
+    relative: BoolArray
+    """(n,) whether axis words were relative (G91)."""
+    homed: IntArray
+    """(n,) bits of the joints that were homed when the row ran."""
+    dwell: FloatArray
+    """(n,) s of rest before the row; NaN where the machine only waits for its queue to empty; 0 if neither."""
+    commands: tuple[Command, ...]
+    """Every non-motion command worth keeping, in order."""
+    code_first_line: dict[tuple[str, int], int]
+    """First line of every command that appears."""
+    code_count: Counter[tuple[str, int]]
+    dropped: dict[str, list[int]] = field(default_factory=dict)
+    """Lines whose motion could not be understood, by reason."""
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    @property
+    def before(self) -> FloatArray:
+        """(n, k) joints at the start of every row."""
+        return np.concatenate([self.start[None], self.joints[:-1]])
+
+
+KEPT = {
+    ("M", n * 10)
+    for n in (0, 1, 82, 83, 104, 109, 112, 116, 140, 190, 191, 200, 201, 203, 204, 205, 302, 566, 568, 600)
+} | {("G", n * 10) for n in (4, 10, 20, 28, 29, 90, 91, 92, 93, 94)}
+"""Non-motion commands whose words matter later."""
+
+
+def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) -> Motion:
+    """Run the modal state over every block. Never raises: what cannot be understood is in `dropped`."""
+    k = len(profile.joints)
+    letters = np.array([ord(letter) for letter in profile.letters], np.int64)
+    rotary = np.array([joint.rotary for joint in profile.joints])
+    home = profile.array("home") * profile.to_shown
+    state = kernel.fresh_state(k)
+    parts = [kernel.fresh_rows(0, k)]
+    commands: list[Command] = []
+    first_line: dict[tuple[str, int], int] = {}
+    count: Counter[tuple[str, int]] = Counter()
+    dropped: dict[str, list[int]] = {}
+    rows = 0
+    for block in blocks:
+        at = 0
+        m = len(block.line)
+        row_of_command = np.zeros(m, np.int64)
+        problem = np.zeros(m, np.int64)
+        while at < m:
+            room = m - at + 20000
+            out = kernel.fresh_rows(room, k)
+            at, made = kernel.execute(
+                at, block.letter, block.code, block.flags, block.word_start, block.word_letter, block.word_value,
+                block.line, letters, rotary, home, rules.g90_resets_e, rules.case_sensitive, state, out,
+                row_of_command, problem, rows,
+            )  # fmt: skip
+            parts.append(kernel.joined([out], made))
+            rows += made
+        _collect(block, row_of_command, commands, first_line, count)
+        for code, reason in kernel.PROBLEMS.items():
+            hit = block.line[problem == code]
+            if hit.size:
+                dropped.setdefault(reason, []).extend(hit.tolist())
+    joined = kernel.joined(parts)
+    return Motion(
+        line=joined.line,
+        kind=joined.kind,
+        start=np.zeros(k),
+        joints=joined.joints / profile.to_shown,
+        filament=joined.filament,
+        feed=joined.feed,
+        inverse=(joined.flags & kernel.INVERSE) > 0,
+        relative=(joined.flags & kernel.RELATIVE) > 0,
+        homed=joined.homed,
+        dwell=joined.dwell,
+        commands=tuple(commands),
+        code_first_line=first_line,
+        code_count=count,
+        dropped=dropped,
+    )
+
+
+def _collect(
+    block: Block,
+    rows: IntArray,
+    commands: list[Command],
+    first_line: dict[tuple[str, int], int],
+    count: Counter[tuple[str, int]],
+) -> None:
+    """Keep what is not motion: counts of every command, and the words of those that matter."""
+    plain = (block.flags & kernel.NOT_A_COMMAND) == 0
+    index = np.flatnonzero(plain)
+    key = block.letter[index].astype(np.int64) * 10_000_000 + block.code[index]
+    values, first, inverse, counts = np.unique(key, return_index=True, return_inverse=True, return_counts=True)
+    for which, value in enumerate(values.tolist()):
+        name = (chr(value // 10_000_000), value % 10_000_000)
+        count[name] += int(counts[which])
+        first_line.setdefault(name, int(block.line[index[first[which]]]))
+    kept = np.array(
+        [(chr(v // 10_000_000), v % 10_000_000) in KEPT or v // 10_000_000 == ord("T") for v in values.tolist()], bool
+    )
+    if not kept.any():
+        return
+    for i in index[kept[inverse]].tolist():
+        span = slice(int(block.word_start[i]), int(block.word_start[i + 1]))
+        words = tuple(
+            (chr(letter), value)
+            for letter, value in zip(block.word_letter[span].tolist(), block.word_value[span].tolist(), strict=True)
+        )
+        commands.append(Command(int(block.line[i]), int(rows[i]), chr(int(block.letter[i])), int(block.code[i]), words))
+
+
+def code_name(letter: str, code: int) -> str:
+    """('G', 434) as G43.4."""
+    whole, tenth = divmod(code, 10)
+    return f"{letter}{whole}.{tenth}" if tenth else f"{letter}{whole}"

@@ -1,0 +1,147 @@
+"""What the comments of a program say about its motions: role, width, height, wanted speed, layer.
+
+Understood are this project's own keys (`;ROLE:`, `;SPEED:`), those that PrusaSlicer, OrcaSlicer and their viewers share
+(`;TYPE:`, `;WIDTH:`, `;HEIGHT:`, `;LAYER_CHANGE`, `;Z:`), and those of Cura (`;TYPE:WALL-OUTER`, `;LAYER:`) and
+Simplify3D (`; feature`). A comment holds until the next of its kind.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.roles import Role
+
+from trunnion_sim.reader import Block
+
+OTHER = -1
+"""A role that the comments name and this project has not, such as support; or none named at all."""
+HEADER_KEYS = 2000
+"""`; key = value` comments kept at most."""
+
+_ROLES = {
+    Role.OUTER_WALL: "external perimeter|outer wall|wall-outer|overhang perimeter|overhang wall|outer perimeter",
+    Role.INNER_WALL: "perimeter|inner wall|wall-inner|inner perimeter|gap fill|gap infill|thin wall"
+    "|floating vertical shell",
+    Role.INFILL: "internal infill|sparse infill|fill|infill",
+    Role.SOLID_INFILL: "solid infill|internal solid infill|skin|bottom surface|bridge infill|bridge"
+    "|internal bridge infill|internal bridge|solid layer",
+    Role.TOP_SOLID_INFILL: "top solid infill|top surface|ironing",
+    Role.SKIRT: "skirt/brim|skirt|brim",
+}
+ROLE_OF_TEXT = {name: int(role) for role, names in _ROLES.items() for name in names.split("|")} | {
+    role.text: int(role) for role in Role
+}
+
+
+@dataclass
+class Notes:
+    """Collects comments while the blocks pass through; then answers for rows."""
+
+    header: dict[str, str] = field(default_factory=dict)
+    """Values of `; key = value` comments; the last one counts."""
+    _events: dict[str, tuple[list[int], list[float]]] = field(
+        default_factory=lambda: {key: ([], []) for key in ("type", "role", "width", "height", "speed", "layer")}
+    )
+    _known: dict[bytes, tuple[str, float] | None] = field(default_factory=dict)
+    _layer: int = -1
+
+    def watch(self, blocks: Iterable[Block]) -> Iterator[Block]:
+        """Pass blocks on and read their comments."""
+        for block in blocks:
+            for line, text in block.comments:
+                self._read(line, text)
+            yield block
+
+    def _read(self, line: int, text: bytes) -> None:
+        if text in self._known:
+            found = self._known[text]
+        else:
+            found = _meaning(text)
+            if len(self._known) < 100_000:
+                self._known[text] = found
+        if found is None:
+            self._header(text)
+            return
+        key, value = found
+        if key == "layer":
+            self._layer = self._layer + 1 if np.isnan(value) else int(value)
+            value = float(self._layer)
+        lines, values = self._events[key]
+        lines.append(line)
+        values.append(value)
+
+    def _header(self, text: bytes) -> None:
+        name, equals, value = text.partition(b" = ")
+        if equals and len(self.header) < HEADER_KEYS:
+            self.header[name.strip().decode("utf-8", "replace")] = value.strip().decode("utf-8", "replace")
+
+    def says(self, key: str) -> bool:
+        """Whether any comment of this kind was seen."""
+        return bool(self._events[key][0])
+
+    def of_lines(self, key: str, lines: IntArray, default: float) -> FloatArray:
+        """(n,) the value of a kind that holds at each line of the file."""
+        at, values = self._events[key]
+        if not at:
+            return np.full(len(lines), default)
+        held = np.concatenate([[default], values])
+        return held[np.searchsorted(np.asarray(at), lines, side="right")]
+
+
+@dataclass(frozen=True, eq=False)
+class RowNotes:
+    """What the comments say, row by row; NaN, OTHER or -1 where they are silent."""
+
+    role: IntArray
+    """(n,) of `Role`, or OTHER."""
+    width: FloatArray
+    height: FloatArray
+    speed: FloatArray
+    """(n,) mm/s wanted of the tip."""
+    layer: IntArray
+    """(n,) from 0; -1 before the first layer."""
+    own_roles: bool
+    """Whether the program names the role of every row itself (`;ROLE:`), travels included."""
+
+    @property
+    def bead(self) -> BoolArray:
+        """(n,) whether the role is one that lays a bead."""
+        return (self.role >= Role.SKIRT) & (self.role <= Role.NONPLANAR_INFILL)
+
+
+def row_notes(notes: Notes, lines: IntArray) -> RowNotes:
+    """Answers for the rows of a motion, given their lines."""
+    own = notes.says("role")
+    return RowNotes(
+        role=notes.of_lines("role" if own else "type", lines, OTHER).astype(np.int64),
+        width=notes.of_lines("width", lines, np.nan),
+        height=notes.of_lines("height", lines, np.nan),
+        speed=notes.of_lines("speed", lines, np.nan),
+        layer=notes.of_lines("layer", lines, -1.0).astype(np.int64),
+        own_roles=own,
+    )
+
+
+def _meaning(text: bytes) -> tuple[str, float] | None:
+    """Kind and value of one comment (without its semicolon); None where it says nothing that is understood."""
+    words = text.decode("utf-8", "replace").strip()
+    if words in ("LAYER_CHANGE", "CHANGE_LAYER"):
+        return "layer", np.nan
+    for prefix, kind in (("ROLE:", "role"), ("TYPE:", "type"), ("FEATURE:", "type"), ("feature ", "type")):
+        if words.startswith(prefix):
+            return kind, float(ROLE_OF_TEXT.get(words[len(prefix) :].strip().lower(), OTHER))
+    for prefix, kind in (
+        ("WIDTH:", "width"),
+        ("LINE_WIDTH:", "width"),
+        ("HEIGHT:", "height"),
+        ("SPEED:", "speed"),
+        ("LAYER:", "layer"),
+    ):
+        if words.startswith(prefix):
+            try:
+                value = float(words[len(prefix) :])
+            except ValueError:
+                return None
+            return (kind, value) if np.isfinite(value) else None
+    return None

@@ -1,0 +1,71 @@
+"""What the judge knows about one firmware: the commands it takes and how it reads F and rounds corners.
+
+A firmware is a file in `firmwares/` that exposes RULES; the profile's `firmware` is the name of the file.
+"""
+
+import importlib
+import pkgutil
+from dataclasses import dataclass
+from typing import Literal
+
+from trunnion_core.errors import ProfileError
+from trunnion_core.validation import nearest
+
+from trunnion_sim import firmwares
+
+
+@dataclass(frozen=True)
+class Rules:
+    """How one firmware executes a program."""
+
+    name: str
+    commands: frozenset[tuple[str, int]]
+    """Letter and ten times the number of every command it knows."""
+    corners: Literal["marlin", "per_axis"]
+    """How the speed at a corner follows from the joints' corner speeds: see `replay_kernel`."""
+    g90_resets_e: bool
+    """Whether G90 and G91 also set the mode of the extruder."""
+    case_sensitive: bool
+    """Whether a lower-case letter is an unknown command."""
+    inverse_time: bool
+    """Whether G93 is understood."""
+    max_line: int
+    """Bytes of one line, with number and checksum, that the firmware can take."""
+    least_blocks: int
+    """Moves that the planner looks ahead at least, whatever the profile says."""
+    slowest: float
+    """mm/s; slower moves are sped up to this."""
+    starts_at_corner_speed: bool
+    """Whether a move from rest starts with the corner speed at once (classic jerk) instead of from zero."""
+
+
+def find_rules(name: str, source: str = "profile") -> Rules:
+    """The rules of the firmware of that name. ProfileError suggests the nearest."""
+    known = firmware_names()
+    if name not in known:
+        raise ProfileError(source, [f"machine.firmware: the simulator knows no '{name}', {nearest(name, known)}"])
+    found = importlib.import_module(f"{firmwares.__name__}.{name}").RULES
+    if not isinstance(found, Rules) or found.name != name:
+        raise TypeError(f"firmwares/{name}.py: RULES should be a Rules called '{name}'")
+    return found
+
+
+def firmware_names() -> tuple[str, ...]:
+    """Every firmware whose rules are known, sorted."""
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(firmwares.__path__)))
+
+
+def codes(g: str, m: str) -> frozenset[tuple[str, int]]:
+    """Commands from two lists of numbers and ranges ("0-3 4 43.4"), and every T."""
+    return frozenset(_numbers("G", g) | _numbers("M", m) | {("T", n * 10) for n in range(16)})
+
+
+def _numbers(letter: str, text: str) -> set[tuple[str, int]]:
+    found = set()
+    for word in text.split():
+        low, _, high = word.partition("-")
+        if high:
+            found |= {(letter, n * 10) for n in range(int(low), int(high) + 1)}
+        else:
+            found.add((letter, round(float(low) * 10)))
+    return found
