@@ -53,7 +53,7 @@ def ordered(layer: Layer, tip: FloatArray, seams: FloatArray) -> OrderedLayer:
     tip (3,) mm is where the last bead ended, seams (m, 3) mm are those of the last layer. O(beads²) per island and
     phase over arrays.
     """
-    islands = _islands(layer.beads)
+    islands = islands_of(layer.beads)
     home = _home(layer.beads, islands)
     beads: list[Bead] = []
     owner: list[int] = []
@@ -74,7 +74,7 @@ def ordered(layer: Layer, tip: FloatArray, seams: FloatArray) -> OrderedLayer:
     return OrderedLayer(tuple(beads), np.array(owner, dtype=np.int64), tuple(islands), found)
 
 
-def _islands(beads: Sequence[Bead]) -> list[Polygon]:
+def islands_of(beads: Sequence[Bead]) -> list[Polygon]:
     """The areas within the outer walls, seen from above."""
     rings = [LineString(bead.points[:, :2]) for bead in beads if bead.role in OUTER and bead.closed]
     if not rings:

@@ -1,7 +1,7 @@
 """A solid, placed mesh becomes layers and a toolpath: the whole of slicing in one call."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from time import perf_counter
 
 from trunnion_core.findings import Finding
@@ -11,7 +11,9 @@ from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
 
 from trunnion_slicer.assemble import to_toolpath
+from trunnion_slicer.nonplanar.plan import plan_nonplanar
 from trunnion_slicer.planar import planar_layers
+from trunnion_slicer.support import unsupported
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,29 +21,35 @@ class SliceResult:
     """What slicing made of a mesh."""
 
     stack: LayerStack
+    """Planar layers from the bed up, then non-planar layers from the lowest up."""
     toolpath: Toolpath
     findings: tuple[Finding, ...]
-    timings: Mapping[str, float] = field(default_factory=dict)
+    timings: Mapping[str, float]
     """Seconds of every stage, in the order of the work."""
 
 
 def slice_mesh(mesh: Mesh, settings: PrintSettings) -> SliceResult:
-    """Layers and toolpath of `mesh`, a solid that stands on z = 0 where it is to be printed.
+    """Layers and toolpath of `mesh`, a closed solid that stands on z = 0 where it is to be printed.
 
-    Raises MeshError or PlacementError for a part that cannot be sliced, SettingsError for an unknown pattern.
+    The space of the non-planar layers, if any, is taken out of the part first; what is left is sliced planar and
+    printed before them. Raises MeshError or PlacementError for a part that cannot be sliced, SettingsError for an
+    unknown infill pattern.
     """
     clock = _Clock()
-    findings: tuple[Finding, ...] = ()
-    layers: list[Layer] = planar_layers(mesh, settings)
+    plan = plan_nonplanar(mesh, settings)
+    clock.lap("nonplanar")
+    planar: list[Layer] = planar_layers(mesh if plan is None else plan.planar_mesh, settings)
     clock.lap("planar")
-    stack = LayerStack(tuple(layers))
+    findings = unsupported(planar) + (() if plan is None else plan.findings)
+    stack = LayerStack((*planar, *(() if plan is None else plan.layers)))
+    clock.lap("findings")
     toolpath = to_toolpath(stack, settings)
     clock.lap("toolpath")
     return SliceResult(stack, toolpath, findings, clock.laps)
 
 
 class _Clock:
-    """Seconds since the last lap, by name."""
+    """Seconds between laps, by name."""
 
     def __init__(self) -> None:
         self.laps: dict[str, float] = {}

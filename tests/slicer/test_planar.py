@@ -125,7 +125,7 @@ def test_no_density_no_infill_but_skins() -> None:
 
 def test_holes_stay_open() -> None:
     for layer in planar_layers(SHAPES["plate with holes"], DENSE):
-        beads = [line for line in lines(layer, *Role)]
+        beads = list(lines(layer, *Role))
         for x, y, radius in ((10, 10, 3), (27, 9, 5)):
             nearest = min(line.distance(Point(x, y)) for line in beads)
             assert nearest == pytest.approx(radius + 0.2, abs=0.03)

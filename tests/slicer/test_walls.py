@@ -66,9 +66,9 @@ def test_beads_stay_inside_and_the_rest_begins_at_their_inner_edge(region: Multi
     rings, inside = walls(region, count, WIDTH, SPACING)
     for index, ring in rings:
         from_outline = shapely.distance(shapely.points(ring), region.boundary)
-        assert from_outline.min() > WIDTH / 2 + index * SPACING - 1e-6
+        assert from_outline.min() > WIDTH / 2 + index * SPACING - 1e-5
         assert region.contains(LineString(ring))
     innermost = [LineString(ring) for index, ring in rings if index == count - 1]
     if innermost and not inside.is_empty:
         edge = np.concatenate([shapely.get_coordinates(part.exterior) for part in inside.geoms])
-        assert shapely.distance(shapely.points(edge), shapely.union_all(innermost)).min() > SPACING / 2 - 1e-6
+        assert shapely.distance(shapely.points(edge), shapely.union_all(innermost)).min() > SPACING / 2 - 1e-5
