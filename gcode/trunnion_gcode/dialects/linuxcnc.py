@@ -1,0 +1,28 @@
+"""LinuxCNC in joint coordinates (TCP off) with inverse time feed, the filament as a U axis.
+
+RS274NGC knows no E word, no relative mode for one axis and no heaters: filament is absolute U from 0 (`G92 U0`), and
+M100 to M199 are user-defined commands with P words, which the machine's configuration has to supply. G0 ignores F, so
+travels are G1 as well. With G93 every move carries F, one over its minutes.
+"""
+
+from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.metrics import linear_first
+
+DIALECT = Dialect(
+    name="linuxcnc",
+    metric=linear_first,
+    inverse_time=True,
+    relative_extrusion=False,
+    extruder="U",
+    travel="G1",
+    start=("G21", "G17", "G40", "G49", "G80", "G90", "G92 U0", "G64 P0.01", "G93"),
+    finish=("G94", "M2"),
+    nozzle_temperature="M104 P%s",
+    wait_nozzle="M109 P%s",
+    bed_temperature="M140 P%s",
+    wait_bed="M190 P%s",
+    fan="M106 P%s",
+    progress=None,
+    checksums=False,
+    max_line=255,
+)
