@@ -1,0 +1,1 @@
+"""A Marlin in software: bytes and time in, bytes and a trace out."""

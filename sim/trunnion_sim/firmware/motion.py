@@ -1,0 +1,85 @@
+"""What the firmware believes of its axes: position, modes, offsets, limits (Marlin 2.1 `motion.cpp`, `G0_G1.cpp`).
+
+Positions are native, in mm and degrees with the filament last; G92 shifts what a person reads and writes, not them.
+"""
+
+import math
+
+from trunnion_core.profile import MachineProfile
+
+STARTING_FEED = 25.0
+"""mm/s before the first F word."""
+LONGEST_EXTRUSION = 200.0
+"""mm of filament in one move (EXTRUDE_MAXLENGTH)."""
+
+
+class Motion:
+    """State that moves are read with."""
+
+    def __init__(self, profile: MachineProfile) -> None:
+        joints = profile.joints
+        self.letters = profile.letters
+        k = len(joints)
+        self.columns = {letter: i for i, letter in enumerate((*profile.letters, "E"))}
+        self.linear = [not joint.rotary for joint in joints] + [True]
+        self.low = [joint.shown(joint.min) for joint in joints] + [-math.inf]
+        self.high = [joint.shown(joint.max) for joint in joints] + [math.inf]
+        self.home = [joint.shown(joint.home) for joint in joints]
+        self.position = [0.0] * (k + 1)
+        """Where the last move in the queue ends."""
+        self.shift = [0.0] * (k + 1)
+        """Added to native positions to get logical ones."""
+        self.homed = [False] * (k + 1)
+        self.relative = [False] * (k + 1)
+        self.unit = 1.0
+        self.feed = STARTING_FEED
+        self.feed_factor = 1.0
+        self.flow_factor = 1.0
+        self.soft_limits = True
+
+    def logical(self) -> list[float]:
+        """What M114 shows."""
+        return [p + s for p, s in zip(self.position, self.shift, strict=True)]
+
+    def target(self, words: dict[str, float | None]) -> list[float]:
+        """Native goal of a move, not yet limited; remembers its F."""
+        goal = self.position.copy()
+        for letter, number in words.items():
+            column = self.columns.get(letter)
+            if column is None or number is None:
+                continue
+            if self.unit != 1.0 and self.linear[column]:
+                number *= self.unit
+            goal[column] = goal[column] + number if self.relative[column] else number - self.shift[column]
+        feed = words.get("F")
+        if feed is not None and feed > 0:
+            self.feed = feed * self.unit / 60.0
+        return goal
+
+    def limit(self, goal: list[float]) -> None:
+        """Cut a goal to the limits of the joints that know where they are."""
+        if not self.soft_limits:
+            return
+        for i, known in enumerate(self.homed):
+            if known:
+                value = goal[i]
+                if value < self.low[i]:
+                    goal[i] = self.low[i]
+                elif value > self.high[i]:
+                    goal[i] = self.high[i]
+
+    def name_here(self, words: dict[str, float | None]) -> bool:
+        """G92: call the present place so; returns whether the filament was named."""
+        named_filament = False
+        for letter, column in self.columns.items():
+            number = words.get(letter)
+            if number is None:
+                continue
+            if self.linear[column]:
+                number *= self.unit
+            if letter == "E":
+                self.position[column] = number
+                named_filament = True
+            else:
+                self.shift[column] = number - self.position[column]
+        return named_filament

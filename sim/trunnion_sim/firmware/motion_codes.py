@@ -1,0 +1,237 @@
+"""Commands that move, or change how moves are read: G0 to G92, M17 to M410 (Marlin 2.1 `gcode/`)."""
+
+from typing import TYPE_CHECKING
+
+from trunnion_sim.firmware import planner_kernel as kernel
+from trunnion_sim.firmware.parser import Command
+from trunnion_sim.firmware.waits import Steps, Wait
+
+if TYPE_CHECKING:
+    from trunnion_sim.firmware.machine import SoftwareMachine
+
+HOMING_SPEED = 50.0
+"""mm/s and degrees/s, or half of what the joint can where that is less."""
+
+
+def dwell(machine: "SoftwareMachine", command: Command) -> Steps:
+    """G4: wait P milliseconds or S seconds once all motion has ended."""
+    seconds = command.value("P") / 1000.0 if "P" in command.words else 0.0
+    if "S" in command.words:
+        seconds = command.value("S")
+    yield from synchronize(machine)
+    machine.say("//action:notification Sleep...\n")
+    yield Wait(until=machine.now + max(seconds, 0.0))
+
+
+def home(machine: "SoftwareMachine", command: Command) -> Steps:
+    """G28: drive the named joints, or all, to their endstops one after the other."""
+    yield from synchronize(machine)
+    motion, planner = machine.motion, machine.planner
+    named = [letter for letter in motion.letters if letter in command.words]
+    for letter in named or motion.letters:
+        column = motion.columns[letter]
+        goal = motion.position.copy()
+        goal[column] = motion.home[column]
+        speed = min(HOMING_SPEED, 0.5 * float(planner.limits[kernel.MAX_SPEED, column]))
+        planner.add(goal, speed, 1.0, machine.line, machine.now)
+        yield from synchronize(machine)
+        motion.position[column] = motion.home[column]
+        motion.shift[column] = 0.0
+        motion.homed[column] = True
+        planner.set_joints(motion.position[:-1])
+    machine.say(machine.position_report())
+
+
+def synchronize(machine: "SoftwareMachine", command: Command | None = None) -> Steps:
+    """M400: until every move has ended."""
+    planner = machine.planner
+    if planner.moves:
+        yield Wait(ready=lambda: planner.moves == 0)
+
+
+def absolute(machine: "SoftwareMachine", command: Command) -> None:
+    """G90, which also makes the filament absolute."""
+    machine.motion.relative = [False] * len(machine.motion.relative)
+
+
+def relative(machine: "SoftwareMachine", command: Command) -> None:
+    """G91, which also makes the filament relative."""
+    machine.motion.relative = [True] * len(machine.motion.relative)
+
+
+def filament_absolute(machine: "SoftwareMachine", command: Command) -> None:
+    """M82."""
+    machine.motion.relative[-1] = False
+
+
+def filament_relative(machine: "SoftwareMachine", command: Command) -> None:
+    """M83."""
+    machine.motion.relative[-1] = True
+
+
+def inches(machine: "SoftwareMachine", command: Command) -> None:
+    """G20."""
+    machine.motion.unit = 25.4
+
+
+def millimetres(machine: "SoftwareMachine", command: Command) -> None:
+    """G21."""
+    machine.motion.unit = 1.0
+
+
+def name_here(machine: "SoftwareMachine", command: Command) -> None:
+    """G92: reports the position before its ok."""
+    if machine.motion.name_here(command.words):
+        machine.planner.set_filament(machine.motion.position[-1])
+    machine.say(machine.position_report())
+
+
+def release(machine: "SoftwareMachine", command: Command) -> Steps:
+    """M18, M84: motors off after the last move, or after S seconds of rest; positions are no longer known."""
+    if "S" in command.words:
+        return
+    yield from synchronize(machine)
+    named = [letter for letter in machine.motion.letters if letter in command.words]
+    for letter in named or machine.motion.letters:
+        machine.motion.homed[machine.motion.columns[letter]] = False
+
+
+def stop(machine: "SoftwareMachine", command: Command) -> None:
+    """M410 without the emergency parser; with it the stop has happened already."""
+
+
+def feed_factor(machine: "SoftwareMachine", command: Command) -> None:
+    """M220: percentage on every F."""
+    if "S" in command.words:
+        machine.motion.feed_factor = min(max(command.value("S"), 1.0), 999.0) / 100.0
+    else:
+        machine.say(f"FR:{round(machine.motion.feed_factor * 100)}%\n")
+
+
+def flow_factor(machine: "SoftwareMachine", command: Command) -> None:
+    """M221: percentage on filament."""
+    if "S" in command.words:
+        machine.motion.flow_factor = min(max(command.value("S"), 10.0), 999.0) / 100.0
+    else:
+        machine.say(f"echo:E0 Flow: {round(machine.motion.flow_factor * 100)}%\n")
+
+
+def soft_limits(machine: "SoftwareMachine", command: Command) -> None:
+    """M211: soft endstops on and off."""
+    motion = machine.motion
+    if "S" in command.words:
+        motion.soft_limits = command.value("S") != 0
+        return
+    low = " ".join(f"{x}{v:.2f}" for x, v in zip(motion.letters, motion.low, strict=False))
+    high = " ".join(f"{x}{v:.2f}" for x, v in zip(motion.letters, motion.high, strict=False))
+    state = "ON" if motion.soft_limits else "OFF"
+    machine.say(f"echo:; Soft endstops:\necho:  M211 S{int(motion.soft_limits)} ; {state}\n")
+    machine.say(f"echo:  Min:  {low}   Max:  {high}\n")
+
+
+def steps_per_unit(machine: "SoftwareMachine", command: Command) -> None:
+    """M92."""
+    _set_limits(machine, command, kernel.STEPS_PER_UNIT, "M92")
+
+
+def max_acceleration(machine: "SoftwareMachine", command: Command) -> None:
+    """M201."""
+    _set_limits(machine, command, kernel.MAX_ACCELERATION, "M201")
+
+
+def max_speed(machine: "SoftwareMachine", command: Command) -> None:
+    """M203."""
+    _set_limits(machine, command, kernel.MAX_SPEED, "M203")
+
+
+def path_acceleration(machine: "SoftwareMachine", command: Command) -> None:
+    """M204: P printing, R filament alone, T travel, S printing and travel."""
+    state = machine.planner.state
+    places = {"S": (kernel.PRINT_ACCELERATION, kernel.TRAVEL_ACCELERATION), "P": (kernel.PRINT_ACCELERATION,)}
+    places |= {"R": (kernel.RETRACT_ACCELERATION,), "T": (kernel.TRAVEL_ACCELERATION,)}
+    given = False
+    for letter, where in places.items():
+        if command.value(letter) > 0:
+            given = True
+            for place in where:
+                state[place] = command.value(letter)
+    if not given and not command.words:
+        machine.say(
+            f"echo:  M204 P{state[kernel.PRINT_ACCELERATION]:.2f} R{state[kernel.RETRACT_ACCELERATION]:.2f} "
+            f"T{state[kernel.TRAVEL_ACCELERATION]:.2f}\n"
+        )
+
+
+def corners(machine: "SoftwareMachine", command: Command) -> None:
+    """M205: what may jump per axis, J junction deviation, B shortest segment in microseconds."""
+    state, limits, motion = machine.planner.state, machine.planner.limits, machine.motion
+    uses_deviation = state[kernel.JUNCTION_DEVIATION] > 0
+    for letter, number in command.words.items():
+        if number is None or number < 0:
+            continue
+        if letter == "J" and uses_deviation:
+            if not 0.01 <= number <= 0.3:
+                machine.say("Error:?J out of range (0.01 to 0.3)\n")
+            else:
+                state[kernel.JUNCTION_DEVIATION] = number
+        elif letter in motion.columns and not uses_deviation:
+            limits[kernel.JERK, motion.columns[letter]] = number
+        elif letter == "B" and "B" not in motion.columns:
+            state[kernel.MIN_SEGMENT_TIME] = number / 1e6
+
+
+def cold_extrusion(machine: "SoftwareMachine", command: Command) -> None:
+    """M302: P1 allows cold extrusion, S sets the coldest."""
+    if "S" in command.words:
+        machine.coldest_extrusion = command.value("S")
+        machine.allow_cold = machine.coldest_extrusion == 0
+    if "P" in command.words:
+        machine.allow_cold = command.value("P") != 0
+    elif "S" not in command.words:
+        state = "en" if machine.allow_cold else "dis"
+        machine.say(f"echo:Cold extrudes are {state}abled (min temp {machine.coldest_extrusion:.0f}C)\n")
+
+
+def nothing(machine: "SoftwareMachine", command: Command) -> None:
+    """Accepted without a visible effect."""
+
+
+def _set_limits(machine: "SoftwareMachine", command: Command, row: int, code: str) -> None:
+    limits, motion = machine.planner.limits, machine.motion
+    given = False
+    for letter, number in command.words.items():
+        if letter in motion.columns and number is not None and number > 0:
+            limits[row, motion.columns[letter]] = number
+            given = True
+    if row == kernel.STEPS_PER_UNIT and given:
+        machine.planner.refresh(motion.position)
+    if not command.words:
+        words = "".join(f" {x}{v:.2f}" for x, v in zip((*motion.letters, "E"), limits[row], strict=True))
+        machine.say(f"echo:  {code}{words}\n")
+
+
+CODES = {
+    "G4": dwell,
+    "G20": inches,
+    "G21": millimetres,
+    "G28": home,
+    "G90": absolute,
+    "G91": relative,
+    "G92": name_here,
+    "M17": nothing,
+    "M18": release,
+    "M82": filament_absolute,
+    "M83": filament_relative,
+    "M84": release,
+    "M92": steps_per_unit,
+    "M201": max_acceleration,
+    "M203": max_speed,
+    "M204": path_acceleration,
+    "M205": corners,
+    "M211": soft_limits,
+    "M220": feed_factor,
+    "M221": flow_factor,
+    "M302": cold_extrusion,
+    "M400": synchronize,
+    "M410": stop,
+}
