@@ -67,25 +67,51 @@ def inverse_kernel(
 ) -> None:
     """Fill joints (2, n, k): both branches, NaN where out of reach."""
     for i in range(points.shape[0]):
-        k1, x1, x2, r, u, c = split(t, tool_axes[i, 0], tool_axes[i, 1], tool_axes[i, 2])
-        if not c >= 0.0:
-            joints[:, i, :] = np.nan
-            continue
-        for branch in range(2):
-            if branch == 1:
-                c = -c
-            y1 = k1 * t[AZIMUTH, 0] + u * t[AZIMUTH, 1] + c * t[AZIMUTH, 2]
-            y2 = k1 * t[AZIMUTH + 1, 0] + u * t[AZIMUTH + 1, 1] + c * t[AZIMUTH + 1, 2]
-            length = 1.0 / math.sqrt(y1 * y1 + y2 * y2)
-            cos2, sin2 = y1 * length, y2 * length
-            cos1, sin1 = 1.0, 0.0
-            if r > POLE_SINE:
-                cos1, sin1 = u * x1 + c * x2, u * x2 - c * x1
-                length = 1.0 / math.sqrt(cos1 * cos1 + sin1 * sin1)
-                cos1, sin1 = cos1 * length, sin1 * length
-            joints[branch, i, whole[0]] = wrapped(whole[8] * math.atan2(sin1, cos1))
-            joints[branch, i, whole[1]] = wrapped(whole[9] * math.atan2(sin2, cos2))
-            place(t, whole, points[i, 0], points[i, 1], points[i, 2], cos1, sin1, cos2, sin2, joints[branch, i])
+        solve(t, whole, points[i], tool_axes[i], joints[0, i], joints[1, i])
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def solve(
+    t: FloatArray, whole: IntArray, point: FloatArray, tool_axis: FloatArray, first: FloatArray, second: FloatArray
+) -> None:
+    """Fill first and second (k,) with the two branches of one pose."""
+    k1, x1, x2, r, u, c = split(t, tool_axis[0], tool_axis[1], tool_axis[2])
+    if not c >= 0.0:
+        first[:] = np.nan
+        second[:] = np.nan
+        return
+    for branch in range(2):
+        joints = first if branch == 0 else second
+        if branch == 1:
+            c = -c
+        y1 = k1 * t[AZIMUTH, 0] + u * t[AZIMUTH, 1] + c * t[AZIMUTH, 2]
+        y2 = k1 * t[AZIMUTH + 1, 0] + u * t[AZIMUTH + 1, 1] + c * t[AZIMUTH + 1, 2]
+        length = 1.0 / math.sqrt(y1 * y1 + y2 * y2)
+        cos2, sin2 = y1 * length, y2 * length
+        cos1, sin1 = 1.0, 0.0
+        if r > POLE_SINE:
+            cos1, sin1 = u * x1 + c * x2, u * x2 - c * x1
+            length = 1.0 / math.sqrt(cos1 * cos1 + sin1 * sin1)
+            cos1, sin1 = cos1 * length, sin1 * length
+        joints[whole[0]] = wrapped(whole[8] * math.atan2(sin1, cos1))
+        joints[whole[1]] = wrapped(whole[9] * math.atan2(sin2, cos2))
+        place(t, whole, point[0], point[1], point[2], cos1, sin1, cos2, sin2, joints)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def lean(
+    t: FloatArray, whole: IntArray, point: FloatArray, tool_axis: FloatArray, angle: float, joints: FloatArray
+) -> None:
+    """Fill joints (k,) with rotary 1 at `angle` and the tool as near to tool_axis as rotary 2 can bring it."""
+    k1, x1, x2, _, _, _ = split(t, tool_axis[0], tool_axis[1], tool_axis[2])
+    cos1, sin1 = math.cos(whole[8] * angle), math.sin(whole[8] * angle)
+    v, w = cos1 * x1 + sin1 * x2, cos1 * x2 - sin1 * x1
+    y1 = k1 * t[AZIMUTH, 0] + v * t[AZIMUTH, 1] + w * t[AZIMUTH, 2]
+    y2 = k1 * t[AZIMUTH + 1, 0] + v * t[AZIMUTH + 1, 1] + w * t[AZIMUTH + 1, 2]
+    length = 1.0 / math.sqrt(y1 * y1 + y2 * y2)
+    joints[whole[0]] = angle
+    joints[whole[1]] = wrapped(whole[9] * math.atan2(y2, y1))
+    place(t, whole, point[0], point[1], point[2], cos1, sin1, y1 * length, y2 * length, joints)
 
 
 @njit(cache=True, error_model="numpy")
