@@ -1,0 +1,479 @@
+"""The wire between host and firmware as a state machine: bytes and time come in, bytes and events go out.
+
+Every line carries a number and a checksum, and the firmware takes a line only as the successor of the last one it took;
+so what is executed is exact whatever happens to the oks. Oks only say when there is room. Nothing is ever sent again
+on suspicion: a stream that stands still *asks*, with an M105 under a fresh number, which the firmware either takes
+(then it had everything) or answers with the number that it misses. The answer to M105 is the only ok with temperatures
+in it, so it also says how many oks went missing or came twice.
+"""
+
+from array import array
+from collections import deque
+from collections.abc import Sequence
+from enum import Enum, auto
+
+from trunnion_host.limits import Limits
+from trunnion_host.replies import Kind, Reply, parse, temperatures
+from trunnion_host.wire import numbered
+
+
+class State(Enum):
+    """Where the stream is."""
+
+    GREETING = auto()
+    """Numbers are being agreed on; nothing of the program was sent."""
+    STREAMING = auto()
+    """Lines go out as the window allows."""
+    RESYNC = auto()
+    """A line is asked for again; waiting until the wire is quiet."""
+    STOPPING = auto()
+    """The program is abandoned; the farewell is being sent."""
+    DONE = auto()
+    """Every line was executed."""
+    STOPPED = auto()
+    """It ended earlier; `reason` says why."""
+
+
+LEGAL: dict[State, frozenset[State]] = {
+    State.GREETING: frozenset({State.STREAMING, State.STOPPED}),
+    State.STREAMING: frozenset({State.RESYNC, State.STOPPING, State.DONE, State.STOPPED}),
+    State.RESYNC: frozenset({State.STREAMING, State.STOPPING, State.STOPPED}),
+    State.STOPPING: frozenset({State.STOPPED}),
+    State.DONE: frozenset(),
+    State.STOPPED: frozenset(),
+}
+
+ASK = -1
+"""In the log: an M105 that the host put between the program's lines."""
+QUESTION = "M105"
+FINISH = "M400"
+"""Waits until everything before it has moved."""
+HEATERS_OFF = ("M104 S0", "M140 S0", "M107")
+FAREWELL = ("M410", *HEATERS_OFF, "G91", "G1 Z5 F600", "G90")
+"""Stop where it is, heaters off, away from the part."""
+LONGEST_REPLY = 4096
+"""Bytes without a newline beyond this are noise."""
+
+
+class Sender:
+    """Streams `lines` (prepared commands) once, exactly. Call start, then receive and tick; each returns what to write.
+
+    `executed` counts the program's lines that the firmware took; when the state is DONE it is all of them, and the
+    motion is over. `heaters` holds the last report: letter to (actual, target) °C; `talk` what the firmware last said
+    to people.
+    """
+
+    def __init__(self, lines: Sequence[str], limits: Limits | None = None, farewell: Sequence[str] = FAREWELL) -> None:
+        self.limits = limits or Limits()
+        self.state = State.GREETING
+        self.reason = ""
+        self.heaters: dict[str, tuple[float, float | None]] = {}
+        self.talk: deque[str] = deque(maxlen=200)
+        self.resends = 0
+        self.questions = 0
+        self.executed = 0
+        self.paused = False
+        self.window_lines = self.limits.window_lines
+        self._total = len(lines)
+        self._program = (*lines, FINISH, *farewell)
+        self._end_of_feed = self._total + 1
+        self._log = array("q", [ASK, ASK])  # from number to index in the program; 0 is M110, 1 the greeting's M105
+        self._next_line = 0
+        self._next_number = 1
+        self._acked = 0
+        self._last_needed = -1
+        self._in_flight: deque[tuple[int, int]] = deque()
+        self._bytes_in_flight = 0
+        self._slow = True
+        self._asked: int | None = None
+        self._want_ask = False
+        self._verified = 0
+        self._unanswered_asks = 0
+        self._again = (0, 0)
+        self._doubted: int | None = None
+        self._recent_resends: deque[int] = deque(maxlen=5)
+        self._buffer = bytearray()
+        self._out = bytearray()
+        self._numbers_agreed = False
+        self._line_refused = False
+        self._now = self._since = self._heard = self._alive = self._moved = self._asked_at = 0.0
+
+    @property
+    def total(self) -> int:
+        """Lines of the program."""
+        return self._total
+
+    @property
+    def sent(self) -> int:
+        """Lines of the program that went out at least once."""
+        return min(self._next_line, self._total)
+
+    @property
+    def greeted(self) -> bool:
+        """Whether a firmware ever answered."""
+        return self._acked > 0
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing more will happen."""
+        return self.state in (State.DONE, State.STOPPED)
+
+    @property
+    def patience(self) -> float:
+        """Seconds that the caller may wait for bytes before the next tick."""
+        return self.limits.quiet / 2 if self.state is State.RESYNC else 0.05
+
+    def start(self, now: float) -> bytes:
+        """Begin to agree on numbers."""
+        self._now = self._since = self._heard = self._alive = self._moved = now
+        self._greet()
+        return self._taken()
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        """Bytes that came from the firmware, in pieces of any size."""
+        self._pass_time(now)
+        self._heard = now
+        self._buffer += data
+        *lines, rest = self._buffer.split(b"\n")
+        self._buffer = rest if len(rest) < LONGEST_REPLY else bytearray()
+        for line in lines:
+            if self.over:
+                break
+            self._reply(parse(bytes(line.rstrip(b"\r"))))
+        self._feed()
+        return self._taken()
+
+    def tick(self, now: float) -> bytes:
+        """Let time pass. Call at least every `patience` seconds."""
+        self._pass_time(now)
+        self._timers()
+        self._feed()
+        return self._taken()
+
+    def stop(self, now: float, reason: str) -> bytes:
+        """Abandon the program: stop feeding, stop the motion, heaters off, away from the part."""
+        self._pass_time(now)
+        self._abandon(reason)
+        self._feed()
+        return self._taken()
+
+    # What the firmware says
+
+    def _reply(self, reply: Reply) -> None:
+        kind = reply.kind
+        if kind is not Kind.NOISE:
+            self._alive = self._now
+        if kind is Kind.OK or kind is Kind.OK_REPORT:
+            self._ok(reply)
+        elif kind is Kind.RESEND and reply.number is not None:
+            self._resend(reply.number)
+        elif kind is Kind.BUSY:
+            self._moved = self._now
+        elif kind is Kind.REPORT:
+            self.heaters.update(temperatures(reply.text))
+        elif kind is Kind.START:
+            self._restarted("it sent its start banner")
+        elif kind is Kind.FATAL:
+            self._end(f"the printer stopped by itself: {reply.text}")
+        elif kind is Kind.ACTION:
+            self._action(reply.text)
+        elif kind is Kind.LINE_ERROR:
+            self._line_refused = True
+        elif kind is Kind.NOISE:
+            self._want_ask |= self.state is State.STREAMING  # it may have been an ok
+        elif reply.text:
+            self.talk.append(reply.text)
+
+    def _ok(self, reply: Reply) -> None:
+        self._moved = self._now
+        self._unanswered_asks = 0
+        if reply.kind is Kind.OK_REPORT:
+            self.heaters.update(temperatures(reply.text))
+        if self.state is State.GREETING:
+            self._greeting_ok(reply)
+        elif reply.kind is Kind.OK_REPORT and self._asked is not None:
+            asked, self._asked, self._slow = self._asked, None, False
+            self._verified = max(self._verified, asked)
+            self._doubted = None
+            self._believe(asked)
+            if self.state is State.RESYNC:
+                self._to(State.STREAMING)
+        elif reply.number is not None and self._acked < reply.number < self._next_number:
+            self._believe(reply.number)
+        elif self.state is not State.RESYNC:
+            for _ in range(reply.count):
+                self._one_ok()
+        self._end_if_complete()
+
+    def _one_ok(self) -> None:
+        """The oldest line under way was taken, as far as counting goes."""
+        if not self._in_flight:
+            self._want_ask = True
+            return
+        number, size = self._in_flight.popleft()
+        self._bytes_in_flight -= size
+        if self._asked is not None and number >= self._asked:
+            self._plain_answer(number)
+        if number > self._acked:
+            self._take(number)
+
+    def _plain_answer(self, number: int) -> None:
+        """A question was answered without temperatures: by a firmware that has none, or the answer was damaged."""
+        asked = self._asked
+        self._slow = False
+        if not self.heaters and number == asked:
+            self._verified, self._asked = max(self._verified, number), None
+        elif asked is not None and number > asked + self.limits.window_lines:
+            self._asked = None
+
+    def _believe(self, number: int) -> None:
+        """The firmware has taken everything up to `number`; what was sent after that is still under way."""
+        self._next_number = max(self._next_number, number + 1)
+        self._in_flight = deque((n, len(self._wire(n))) for n in range(number + 1, self._next_number))
+        self._bytes_in_flight = sum(size for _, size in self._in_flight)
+        self._take(number)
+
+    def _take(self, number: int) -> None:
+        """Everything up to `number` counts as executed."""
+        if number > self._again[0]:
+            if self._again[0] and number > self._again[0] + self.limits.calm:
+                self.window_lines = min(self.window_lines + 1, self.limits.window_lines)
+                self._again = (number, 0)
+            elif self._again[1]:
+                self._again = (self._again[0], 0)
+        for index in self._log[self._acked + 1 : number + 1]:
+            if 0 <= index < self._total:
+                self.executed = max(self.executed, index + 1)
+        self._acked = number
+
+    def _resend(self, number: int) -> None:
+        """The firmware misses a line, or says so."""
+        self._line_refused = True
+        if self.state is State.GREETING:
+            return
+        self._moved = self._now
+        self._unanswered_asks = 0
+        self.resends += 1
+        count = self._again[1] + 1 if number == self._again[0] else 1
+        self._again = (number, count)
+        if count >= self.limits.resends:
+            what = f"never sent, number {number}" if number >= len(self._log) else f"'{self._text(number)}'"
+            self._end(f"the printer asked {count} times in a row for the line {what}")
+        elif number > self._next_number:
+            self._want_ask = True
+        elif number == self._next_number:
+            if any(n >= number for n, _ in self._in_flight):
+                self._believe(number - 1)  # an answer to a question that overtook this line
+        elif number <= self._acked and self._doubted != number:
+            self._doubted = number
+            self._ask()
+        elif number <= max(self._verified, self._acked - self.limits.memory):
+            self._restarted(f"it asks for line number {number} though it had taken {self._acked}")
+        else:
+            self._go_back(number)
+
+    def _go_back(self, number: int) -> None:
+        """Send from `number` on again, one line at a time until a question is answered."""
+        self._doubted = None
+        self._recent_resends.append(number)
+        crowded = len(self._recent_resends) == 5 and number - self._recent_resends[0] < self.limits.crowded
+        if crowded and self.window_lines > 1:
+            self.window_lines -= 1  # lost this often: more is under way than the firmware can hold
+            self._recent_resends.clear()
+        self._acked = number - 1
+        self._next_number = number
+        self._in_flight.clear()
+        self._bytes_in_flight = 0
+        self._asked = None
+        self._slow = self._want_ask = True
+        if self.state is State.STREAMING:
+            self._to(State.RESYNC)
+            self._since = self._now
+
+    def _restarted(self, how: str) -> None:
+        """Its state is gone: nothing may move any more. Heaters are off after a restart; that is said all the same."""
+        if self.state is State.GREETING:
+            self._numbers_agreed = False
+            self._asked_at = self._now - self.limits.greeting_retry + self.limits.boot
+            return
+        self._end(f"the printer restarted: {how}")
+        self._out += b"".join(b"\n%b" % line.encode("ascii") for line in HEATERS_OFF) + b"\n"
+
+    def _action(self, text: str) -> None:
+        self.talk.append(text)
+        word = text.removeprefix("action:").strip()
+        if word == "cancel":
+            self._abandon("cancelled at the printer")
+        elif word in ("pause", "paused"):
+            self.paused = True
+        elif word in ("resume", "resumed"):
+            self.paused = False
+
+    # Agreeing on numbers
+
+    def _greet(self) -> None:
+        """Number 0 for the firmware's count; the newline ends whatever stands in its buffer."""
+        self._asked_at = self._now
+        self._numbers_agreed = self._line_refused = False
+        self._out += b"\n" + numbered(0, "M110 N0")
+
+    def _greeting_ok(self, reply: Reply) -> None:
+        """First the ok of M110, then that of the first numbered line, which proves the numbering."""
+        if self._line_refused:
+            self._greet()
+        elif not self._numbers_agreed:
+            self._numbers_agreed = True
+            self._asked_at = self._now
+            self._out += self._wire(1)
+        else:
+            self._acked, self._next_number = 1, 2
+            self._verified = 1 if reply.kind is Kind.OK_REPORT else 0
+            self._asked_at = self._now
+            self._to(State.STREAMING)
+            self._slow = False
+
+    # Time
+
+    def _pass_time(self, now: float) -> None:
+        """Move the clock; a gap in which the host slept is no silence of the printer."""
+        gap = now - self._now
+        if gap > self.limits.jump:
+            for name in ("_since", "_heard", "_alive", "_moved", "_asked_at"):
+                setattr(self, name, getattr(self, name) + gap)
+        self._now = now
+
+    def _timers(self) -> None:
+        """What happens because nothing happened."""
+        limits, now = self.limits, self._now
+        if self.over:
+            return
+        if self.state is State.GREETING:
+            if now - self._since > limits.greeting:
+                self._end(f"nothing that speaks G-code answered within {limits.greeting:g} s")
+            elif now - self._asked_at > limits.greeting_retry:
+                self._greet()
+            return
+        if self.state is State.STOPPING and now - self._since > limits.farewell:
+            self._end(f"{self.reason}; the printer did not confirm that its heaters are off")
+        elif now - self._alive > limits.silence:
+            self._end(f"the printer has been silent for {limits.silence:g} s")
+        elif self.state is State.RESYNC:
+            if now - self._heard >= limits.quiet or now - self._since > limits.resync:
+                self._to(State.STREAMING)
+        elif self._stalled():
+            self._unanswered_asks += 1
+            self._ask()
+        elif now - self._asked_at > limits.poll:
+            self._want_ask = True
+
+    def _stalled(self) -> bool:
+        """Whether an answer is overdue and the wire can take one more question."""
+        waiting = bool(self._in_flight) or self._asked is not None
+        patience = self.limits.ask_after * 2**self._unanswered_asks
+        overdue = self._now - max(self._moved, self._asked_at) > patience
+        return waiting and overdue and self._unanswered_asks < self.limits.asks
+
+    # What goes out
+
+    def _feed(self) -> None:
+        """Send what the window has room for."""
+        if self.state not in (State.STREAMING, State.STOPPING):
+            return
+        lines = 1 if self._slow else self.window_lines
+        while len(self._in_flight) < lines:
+            number = self._next_number
+            new = number == len(self._log)
+            if new:
+                index = self._next_index()
+                if index is None:
+                    break
+                self._log.append(index)
+            wire = self._wire(number)
+            if self._in_flight and self._bytes_in_flight + len(wire) > self.limits.window_bytes:
+                if new:
+                    self._log.pop()
+                break
+            index = self._log[number]
+            if new and index != ASK:
+                self._next_line = index + 1
+            self._next_number = number + 1
+            self._send(number, wire)
+
+    def _next_index(self) -> int | None:
+        """What gets the next number: a question that is due, else a line of the program, else nothing."""
+        if self._want_ask and self._asked is None:
+            return ASK
+        if self.paused and self.state is State.STREAMING:
+            return None
+        return self._next_line if self._next_line < self._end_of_feed else None
+
+    def _ask(self) -> None:
+        """An M105 under a fresh number, though the window is full; the newline ends a line that lost its own."""
+        number = len(self._log)
+        self._log.append(ASK)
+        self._out += b"\n"
+        if self._next_number == number:
+            self._next_number = number + 1
+        self._slow = True
+        self._send(number, self._wire(number))
+
+    def _send(self, number: int, wire: bytes) -> None:
+        if not self._in_flight:
+            self._moved = self._now
+        if self._log[number] == ASK:
+            self._asked, self._asked_at, self._want_ask = number, self._now, False
+            self.questions += 1
+        elif self._log[number] == self._end_of_feed - 1:
+            self._last_needed = number
+        self._out += wire
+        self._in_flight.append((number, len(wire)))
+        self._bytes_in_flight += len(wire)
+
+    def _text(self, number: int) -> str:
+        index = self._log[number]
+        return QUESTION if index == ASK else self._program[index]
+
+    def _wire(self, number: int) -> bytes:
+        return numbered(number, self._text(number))
+
+    def _taken(self) -> bytes:
+        out = bytes(self._out)
+        self._out.clear()
+        return out
+
+    # How it ends
+
+    def _end_if_complete(self) -> None:
+        """Over when the firmware is known to have taken the last number, not merely when enough oks came."""
+        if self._last_needed < 0 or self._in_flight or self._next_number < len(self._log):
+            return
+        if self._verified > self._last_needed:
+            if self.state is State.STREAMING:
+                self._to(State.DONE)
+            elif self.state is State.STOPPING:
+                self._end(self.reason)
+        elif self._asked is None:
+            self._want_ask = True
+
+    def _abandon(self, reason: str) -> None:
+        if self.state is State.GREETING:
+            self._end(reason)
+        elif self.state in (State.STREAMING, State.RESYNC):
+            self._to(State.STOPPING)
+            self.reason = reason
+            self._since = self._now
+            self._next_line = max(self._total + 1, 0)
+            self._end_of_feed = len(self._program)
+            self._last_needed = -1
+            self._slow = self._want_ask = True
+            self._out += b"\nM108\nM410\n"
+
+    def _end(self, reason: str) -> None:
+        if not self.over:
+            self._to(State.STOPPED)
+            self.reason = reason
+
+    def _to(self, state: State) -> None:
+        if state not in LEGAL[self.state]:
+            raise RuntimeError(f"{self.state.name} cannot become {state.name}")
+        self.state = state
