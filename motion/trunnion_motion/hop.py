@@ -13,8 +13,8 @@ from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
 from trunnion_kinematics.chain import JointChain
 
-HOP_CHORD = 0.2
-"""mm. How far the tip may leave its straight way over the part at the clear height: a tenth of CLEARANCE."""
+HOP_CHORD = 0.05
+"""mm. How far the tip may leave its straight way over the part at the clear height, where nothing is printed."""
 CLEARANCE = 2.0
 """mm between the highest thing printed so far and the tip when the machine turns above it."""
 HOME_CLEARANCE = 5.0

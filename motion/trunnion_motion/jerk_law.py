@@ -8,8 +8,8 @@ convex-concave constraints", IEEE T-RO). The rounds start from the acceleration-
 """
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_interp_spline
-from scipy.optimize import linprog
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csr_array, diags_array, vstack
 from trunnion_core.arrays import FloatArray
 
@@ -18,6 +18,12 @@ from trunnion_motion.topp import PathLaw, law_of_derivatives
 ROUNDS = 12
 ENOUGH = 1e-4
 """Relative gain in time below which another round is not worth it."""
+SLOWEST = 1e-9
+"""Least squared path speed, as a share of the greatest, about which the jerk bound is made linear."""
+_JERK_MARGIN = 0.997
+"""Share of the jerk limits that is used: the rest is what the time between two middles is misjudged by."""
+_FINER = 8
+"""Places in every interval at which the speed limit is looked up."""
 
 
 def jerk_law(
@@ -41,11 +47,16 @@ def jerk_law(
         raise ValueError(f"path: {len(path)} samples, should be at least 6 and strictly growing")
     spline = make_interp_spline(path, joints, k=5)
     s = path[0] + (path[-1] - path[0]) * 0.5 * (1 - np.cos(np.linspace(0, np.pi, samples)))
-    window = np.full(samples, tip_max)
+    fine = (s[:-1, None] + np.diff(s)[:, None] * np.linspace(0, 1, _FINER)).ravel()
+    with np.errstate(divide="ignore"):
+        allowed = np.min(speed / np.abs(spline(fine, 1)), axis=1).reshape(-1, _FINER).min(axis=1)
+    window = np.minimum(tip_max, np.minimum(np.append(allowed, np.inf), np.append(np.inf, allowed)))
     quick = law_of_derivatives(s, spline(s, 1), spline(s, 2), speed, acceleration, window)
     squared = _rounds(s, spline, quick, acceleration, jerk)
     path_speed = np.sqrt(squared)
-    time = np.concatenate([[0.0], np.cumsum(2 * np.diff(s) / (path_speed[1:] + path_speed[:-1]))])
+    spent = 2 * np.diff(s) / (path_speed[1:] + path_speed[:-1])
+    spent[[0, -1]] *= 1.5  # at constant jerk from rest s grows as the cube of time
+    time = np.concatenate([[0.0], np.cumsum(spent)])
     return s, PathLaw(time, path_speed, quick.limit)
 
 
@@ -56,71 +67,95 @@ def joint_motion(s: FloatArray, law: PathLaw, path: FloatArray, joints: FloatArr
     u = (x[piece + 1] - x[piece]) / (2 * (s[piece + 1] - s[piece]))
     since = time - law.time[piece]
     where = s[piece] + law.path_speed[piece] * since + 0.5 * u * since**2
-    order = 5 if len(path) >= 6 else 3
-    spline = make_interp_spline(path, joints, k=order)
+    first, last = piece == 0, piece == len(s) - 2
+    h, spent = np.diff(s), np.diff(law.time)
+    where[first] = s[0] + h[0] * (since[first] / spent[0]) ** 3
+    where[last] = s[-1] - h[-1] * (1 - since[last] / spent[-1]) ** 3
+    spline = make_interp_spline(path, joints, k=5)
     return np.asarray(spline(np.clip(where, path[0], path[-1])))
 
 
-def _rounds(
-    s: FloatArray, spline: CubicSpline, quick: PathLaw, acceleration: FloatArray, jerk: FloatArray
-) -> FloatArray:
-    h = np.diff(s)
-    n = len(s)
-    middle = 0.5 * (s[1:] + s[:-1])
-    first, second = spline(middle, 1), spline(middle, 2)
-    rows = np.arange(n - 1)
-    bands, bend_rows, bend_rates, bend_joint = [], [], [], []
-    for j in range(first.shape[1]):
-        ahead, behind = 0.5 * first[:, j] / h + 0.5 * second[:, j], -0.5 * first[:, j] / h + 0.5 * second[:, j]
-        at_middle = csr_array(
-            (np.concatenate([ahead, behind]), (np.tile(rows, 2), np.concatenate([rows + 1, rows]))), shape=(n - 1, n)
-        )
-        bands.append(at_middle / acceleration[j])
-        if np.isfinite(jerk[j]):
-            bend_rows.append(at_middle[1:] - at_middle[:-1])
-            bend_rates.append(jerk[j] * 0.5 * (h[1:] + h[:-1]))
-            bend_joint.append(j)
-    band = vstack(bands)
-
-    ceiling = np.minimum(quick.limit**2, 4 * quick.path_speed.max() ** 2)
+def _rounds(s: FloatArray, spline: BSpline, quick: PathLaw, acceleration: FloatArray, jerk: FloatArray) -> FloatArray:
+    """(n,) squared path speeds: linear programmes, each inside the true limits, until one gains next to nothing."""
+    n, h = len(s), np.diff(s)
+    scale = quick.path_speed.max() ** 2
+    band, bends = _bands(s, spline, acceleration, jerk)
+    band = band * scale
+    ceiling = np.minimum(quick.limit**2, 4 * scale)
     ceiling[0] = ceiling[-1] = 0.0
-    for end, length in ((1, h[0]), (-2, h[-1])):
-        ceiling[end] = min(ceiling[end], _from_rest(spline(s[0 if end > 0 else -1], 1), jerk, length))
-    reference = np.maximum(quick.path_speed**2, 1e-9 * quick.path_speed.max() ** 2)
+    for end, length in ((0, h[0]), (n - 1, h[-1])):
+        inner = min(max(end, 1), n - 2)
+        ceiling[inner] = min(ceiling[inner], _from_rest(spline(s[end], 1), jerk, length))
+    reference = np.maximum(quick.path_speed**2, SLOWEST * scale)
     weight = reference**-1.5
     weight[1:-1] *= 0.5 * (h[1:] + h[:-1])
     weight[[0, -1]] = 0.0
-    scale = quick.path_speed.max() ** 2
-    best = np.inf
-    answer = reference
+    inside = csr_array((np.ones(n - 2), (np.arange(n - 2), np.arange(1, n - 1))), shape=(n - 2, n))
+
+    best, answer = np.inf, reference
     for _ in range(ROUNDS):
-        left, right = [band * scale, -band * scale], [np.ones(2 * band.shape[0])]
-        inner = reference[1:-1]
-        for rate, row in zip(bend_rates, bend_rows, strict=True):
-            bound = rate * inner**-0.5
-            tangent = diags_array(0.5 * scale / inner) @ csr_array(
-                (np.ones(n - 2), (np.arange(n - 2), np.arange(1, n - 1))), shape=(n - 2, n)
-            )
-            scaled = diags_array(scale / bound) @ row
-            left += [scaled + tangent, tangent - scaled]
+        x = reference[1:-1]
+        tangent = diags_array(0.5 * scale / x) @ inside
+        left, right = [band, -band], [np.ones(2 * band.shape[0])]
+        for bend in bends:
+            scaled = diags_array(scale * np.sqrt(x)) @ bend
+            left += [tangent + scaled, tangent - scaled]
             right.append(np.full(2 * (n - 2), 1.5))
-        found = linprog(
+        found = milp(
             -weight / weight.max(),
-            A_ub=vstack(left, format="csr"),
-            b_ub=np.concatenate(right),
-            bounds=np.column_stack([np.zeros(n), ceiling / scale]),
-            method="highs",
+            constraints=LinearConstraint(csr_array(vstack(left)), -np.inf, np.concatenate(right)),
+            bounds=Bounds(np.zeros(n), ceiling / scale),
         )
         if found.x is None:
-            break
+            raise ArithmeticError(f"jerk_law: the linear programme failed: {found.message}")
         answer = np.maximum(found.x * scale, 0.0)
         v = np.sqrt(answer)
-        total = float(np.sum(2 * h / np.maximum(v[1:] + v[:-1], 1e-300)))
+        total = float(np.sum(2 * h / np.maximum(v[1:] + v[:-1], np.finfo(float).tiny)))
         if best - total < ENOUGH * total:
             break
-        best = total
-        reference = np.maximum(answer, 1e-9 * scale)
-    return answer
+        best, reference = total, np.maximum(answer, SLOWEST * scale)
+    return np.asarray(answer)
+
+
+def _bands(
+    s: FloatArray, spline: BSpline, acceleration: FloatArray, jerk: FloatArray
+) -> tuple[csr_array, list[csr_array]]:
+    """Matrices on x: accelerations over their limits at three places of every interval (3 (n - 1) k, n), and for each
+    joint with a jerk limit, how its acceleration changes from interval to interval per its limit and mm (n - 2, n).
+    """
+    n, h = len(s), np.diff(s)
+    rows = np.arange(n - 1)
+    both = (np.tile(rows, 2), np.concatenate([rows + 1, rows]))
+    places = {share: s[:-1] + share * h for share in (0.0, 0.5, 1.0)}
+    first = {share: spline(place, 1) for share, place in places.items()}
+    second = {share: spline(place, 2) for share, place in places.items()}
+    spread = 0.5 * (h[1:] + h[:-1]) * _end_share(s)
+    bands, bends = [], []
+    for j in range(len(acceleration)):
+        at = {}
+        for share in places:
+            ahead = 0.5 * first[share][:, j] / h + share * second[share][:, j]
+            behind = -0.5 * first[share][:, j] / h + (1 - share) * second[share][:, j]
+            at[share] = csr_array((np.concatenate([ahead, behind]), both), shape=(n - 1, n))
+            bands.append(at[share] / acceleration[j])
+        if np.isfinite(jerk[j]):
+            bends.append(diags_array(1.0 / (_JERK_MARGIN * jerk[j] * spread)) @ (at[0.5][1:] - at[0.5][:-1]))
+    return csr_array(vstack(bands)), bends
+
+
+def _end_share(s: FloatArray) -> FloatArray:
+    """(n - 2,) how much shorter than h / sqrt(x) the time between two intervals' middles is in a start from rest.
+
+    There x grows as s^(4/3), within one interval by a factor, and the speed at the node misjudges the time.
+    """
+    share = np.ones(len(s) - 2)
+    for way in (s - s[0], (s[-1] - s)[::-1]):
+        x = way ** (4 / 3)
+        time = way ** (1 / 3) * 3
+        exact = 0.5 * (time[2:] - time[:-2])
+        guess = 0.5 * (way[2:] - way[:-2]) / np.sqrt(x[1:-1])
+        share = np.minimum(share, exact / guess)[::-1]
+    return share
 
 
 def _from_rest(first: FloatArray, jerk: FloatArray, length: float) -> float:
@@ -129,4 +164,4 @@ def _from_rest(first: FloatArray, jerk: FloatArray, length: float) -> float:
         path_jerk = float(np.min(np.where(first != 0, jerk / np.abs(first), np.inf)))
     if not np.isfinite(path_jerk):
         return np.inf
-    return path_jerk**2 / 4 * (6 * length / path_jerk) ** (4 / 3)
+    return float(path_jerk**2 / 4 * (6 * length / path_jerk) ** (4 / 3))

@@ -14,7 +14,7 @@ from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
 from trunnion_kinematics.branches import PathChoice
-from trunnion_kinematics.subdivide import subdivide
+from trunnion_kinematics.subdivide import Subdivision, subdivide
 
 from trunnion_motion.hop import CLEARANCE, HOME_CLEARANCE, Hop, Machine, hop, leave, same_pose_near
 from trunnion_motion.rows import Rows, joined, travelling
@@ -84,17 +84,17 @@ def _stretch(work: _Assembly, first: int, last: int, home: FloatArray, findings:
         axes = np.concatenate([work.choice.tool_axes[first - 1][None], axes])
         states = np.concatenate([end[None], states])
         offset = first - 1
-    points, axes, states, source = subdivide(machine.chain, points, axes, states, work.settings.chord_tolerance)
-    return [lead, _of_toolpath(toolpath, points[1:], axes[1:], states[1:], source[1:] + offset)]
+    fine = subdivide(machine.chain, points, axes, states, work.settings.chord_tolerance)
+    return [lead, _of_toolpath(toolpath, fine, offset)]
 
 
-def _of_toolpath(
-    toolpath: Toolpath, points: FloatArray, axes: FloatArray, joints: FloatArray, source: IntArray
-) -> Rows:
+def _of_toolpath(toolpath: Toolpath, fine: Subdivision, offset: int) -> Rows:
+    """A subdivision of the toolpath's rows from `offset` on, without its first state."""
+    source = fine.source[1:] + offset
     return Rows(
-        joints,
-        points,
-        axes,
+        fine.joints[1:],
+        fine.points[1:],
+        fine.tool_axes[1:],
         source,
         toolpath.role[source],
         toolpath.layer[source],
@@ -115,7 +115,7 @@ def _swings(work: _Assembly) -> IntArray:
     straight = axes[rows] + axes[rows - 1]
     size = np.linalg.norm(straight, axis=1)
     cosine = np.einsum("ij,ij->i", middle, straight) / np.maximum(size, 1e-12)
-    return rows[(cosine < np.cos(np.radians(SWING_DEG))) | (size < 1e-12)]
+    return np.asarray(rows[(cosine < np.cos(np.radians(SWING_DEG))) | (size < 1e-12)])
 
 
 def _said(work: _Assembly, row: int, way: Hop, travels: bool) -> list[Finding]:

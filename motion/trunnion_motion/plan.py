@@ -59,8 +59,9 @@ def plan_motion(toolpath: Toolpath, profile: MachineProfile, settings: PrintSett
     """
     chain = JointChain.from_profile(profile)
     home = profile.array("home")
+    findings: tuple[Finding, ...] = ()
     if not len(toolpath):
-        rows, findings = _no_rows(len(home)), ()
+        rows = _no_rows(len(home))
     else:
         choice = _chosen(toolpath, profile, settings, chain, home)
         rows, findings = assemble(toolpath, Machine.of(profile, chain), choice, settings, home)
@@ -101,6 +102,7 @@ def _chosen(
             travel=toolpath.role == Role.TRAVEL,
             axis_tolerance=float(np.radians(settings.nonplanar_axis_tolerance)),
             start=home,
+            speed=toolpath.speed,
         )
     except UnreachableError as error:
         layer = int(toolpath.layer[error.row])

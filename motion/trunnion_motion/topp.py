@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from scipy.interpolate import CubicSpline
 from trunnion_core.arrays import FloatArray
 
 
@@ -43,17 +42,15 @@ def toppra_law(
     """The least time along a smooth path through samples, from rest to rest.
 
     `path` (n,) strictly growing: the path coordinate of the samples, normally mm of tip travel over the part.
-    `joints` (n, k) mm or rad there; between samples they follow the natural-looking cubic spline (not-a-knot) through
-    them. `speed` and `acceleration` (k,). `tip_max` (n,) or one number: largest path speed, such as wanted tip speed
-    and the hot end's greatest flow give. No law can promise a least speed; where the axes hold the flow below its
-    minimum `flow_window` says so.
-    Raises ValueError unless the path grows and has at least three samples.
+    `joints` (n, k) mm or rad there; between samples they follow the cubic not-a-knot spline through them. `speed` and
+    `acceleration` (k,). `tip_max` (n,) or one number: largest path speed, such as wanted tip speed and the hot end's
+    greatest flow give. No law can promise a least speed; where the axes hold the flow below its minimum
+    `flow_window` says so. Raises ValueError unless the path grows and has at least four samples.
     """
     n = len(path)
-    if n < 3 or not (np.diff(path) > 0).all():
-        raise ValueError(f"path: {n} samples, should be at least 3 and strictly growing")
-    spline = CubicSpline(path, joints)
-    first, second = spline(path, 1), spline(path, 2)
+    if n < 4 or not (np.diff(path) > 0).all():
+        raise ValueError(f"path: {n} samples, should be at least 4 and strictly growing")
+    first, second = spline_derivatives(path, joints)
     window = np.broadcast_to(np.asarray(tip_max, dtype=np.float64), (n,))
     return law_of_derivatives(path, first, second, speed, acceleration, window)
 
@@ -76,6 +73,55 @@ def law_of_derivatives(
         np.ascontiguousarray(tip_max),
     )
     return PathLaw(time, path_speed, limit)
+
+
+def spline_derivatives(path: FloatArray, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """First and second derivatives (n, k) at the samples of the cubic spline through them, n at least 4.
+
+    The same spline as scipy's CubicSpline with not-a-knot ends, several times faster.
+    """
+    first, second = np.empty(joints.shape), np.empty(joints.shape)
+    _spline(np.ascontiguousarray(path), np.ascontiguousarray(joints), first, second)
+    return first, second
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _spline(path: FloatArray, joints: FloatArray, first: FloatArray, second: FloatArray) -> None:
+    """Second derivatives by one tridiagonal elimination for all joints (Press et al., Numerical Recipes, 3.3)."""
+    n, k = joints.shape
+    upper = np.empty(n)
+    for i in range(1, n - 1):
+        a, b = path[i] - path[i - 1], path[i + 1] - path[i]
+        lower, diagonal, above = a, 2.0 * (a + b), b
+        if i == 1:
+            diagonal += a + a * a / b
+            above -= a * a / b
+            lower = 0.0
+        if i == n - 2:
+            diagonal += b + b * b / a
+            lower -= b * b / a
+            above = 0.0
+        pivot = diagonal - (lower * upper[i - 1] if i > 1 else 0.0)
+        upper[i] = above / pivot
+        for j in range(k):
+            bend = 6.0 * ((joints[i + 1, j] - joints[i, j]) / b - (joints[i, j] - joints[i - 1, j]) / a)
+            second[i, j] = (bend - (lower * second[i - 1, j] if i > 1 else 0.0)) / pivot
+    for i in range(n - 3, 0, -1):
+        for j in range(k):
+            second[i, j] -= upper[i] * second[i + 1, j]
+    start = (path[1] - path[0]) / (path[2] - path[1])
+    end = (path[n - 1] - path[n - 2]) / (path[n - 2] - path[n - 3])
+    for j in range(k):
+        second[0, j] = second[1, j] - start * (second[2, j] - second[1, j])
+        second[n - 1, j] = second[n - 2, j] + end * (second[n - 2, j] - second[n - 3, j])
+    for i in range(n - 1):
+        h = path[i + 1] - path[i]
+        for j in range(k):
+            first[i, j] = (joints[i + 1, j] - joints[i, j]) / h - h * (2.0 * second[i, j] + second[i + 1, j]) / 6.0
+    h = path[n - 1] - path[n - 2]
+    for j in range(k):
+        chord = (joints[n - 1, j] - joints[n - 2, j]) / h
+        first[n - 1, j] = chord + h * (second[n - 2, j] + 2.0 * second[n - 1, j]) / 6.0
 
 
 @numba.njit(cache=True, error_model="numpy")

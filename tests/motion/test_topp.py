@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
-from trunnion_motion.topp import toppra_law
+from trunnion_motion.topp import spline_derivatives, toppra_law
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # toppra's own docstrings hold escapes that Python warns of
@@ -77,4 +77,14 @@ def test_the_tip_window_is_kept_where_it_varies():
 
 def test_a_path_that_does_not_grow_is_refused():
     with pytest.raises(ValueError, match="strictly growing"):
-        toppra_law(np.array([0.0, 1.0, 1.0]), np.zeros((3, 5)), SPEED, ACCELERATION)
+        toppra_law(np.array([0.0, 1.0, 1.0, 2.0]), np.zeros((4, 5)), SPEED, ACCELERATION)
+
+
+@pytest.mark.parametrize("n", [4, 5, 6, 50])
+def test_the_spline_is_scipys(n):
+    rng = np.random.default_rng(n)
+    path = np.cumsum(rng.uniform(0.2, 1.5, n))
+    joints = rng.normal(size=(n, 3))
+    first, second = spline_derivatives(path, joints)
+    assert_allclose(first, CubicSpline(path, joints)(path, 1), atol=1e-9)
+    assert_allclose(second, CubicSpline(path, joints)(path, 2), atol=1e-9)
