@@ -5,17 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from shapely.geometry import MultiPolygon
-
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.bead import bead_width
 from trunnion_core.layers import Bead
 from trunnion_core.settings import PrintSettings
+
 from trunnion_slicer.nonplanar.footprint import footprint
 from trunnion_slicer.nonplanar.grid import Grid, build_grid
 from trunnion_slicer.nonplanar.offset import Surfaces
 from trunnion_slicer.nonplanar.orient import corner_normals, smoothed
 from trunnion_slicer.nonplanar.paths import FlatPath, flat_paths
 from trunnion_slicer.nonplanar.project import Lifted, lift
+from trunnion_slicer.nonplanar.stairs import gap_over_stairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +50,26 @@ def beads_of(on: Sheet, settings: PrintSettings) -> list[Bead]:
     faces = on.stack.patch.faces
     density = on.stack.densities(on.layer)
     lines = [path.points for path in paths]
-    lifted = lift(lines, on.grid, corner_normals(on.stack.patch), density[faces], settings.extrusion_width)
+    lowest = on.layer == on.stack.layers - 1
+    stairs = gap_over_stairs(on.stack, settings) if lowest else None
+    normals = corner_normals(on.stack.patch)
+    lifted = lift(lines, on.grid, normals, density[faces], settings.extrusion_width, stairs)
     axes = smoothed(lifted.points, lifted.axes, lifted.starts, float(np.radians(settings.nonplanar_smoothing)))
-    height = np.full(len(axes), settings.layer_height)
+    height = _thickness(lifted) if lowest else np.full(len(axes), settings.layer_height)
     if settings.nonplanar_tool_axis == "vertical":
         height = height / np.maximum(lifted.axes[:, 2], 0.1)
         axes = np.tile([0.0, 0.0, 1.0], (len(axes), 1))
     return _beads(paths, lifted, axes, height)
+
+
+def _thickness(lifted: Lifted) -> FloatArray:
+    """(n,) mm along the normal, of the layer under the piece that ends at each row."""
+    run = np.zeros(len(lifted.points))
+    run[1:] = np.linalg.norm(np.diff(lifted.points[:, :2], axis=0), axis=1)
+    vertical = lifted.volume / np.maximum(run, 1e-9)
+    first = lifted.starts[:-1]
+    vertical[first] = vertical[np.minimum(first + 1, len(vertical) - 1)]
+    return np.asarray(vertical * lifted.axes[:, 2])
 
 
 def _beads(paths: Sequence[FlatPath], lifted: Lifted, axes: FloatArray, height: FloatArray) -> list[Bead]:

@@ -6,7 +6,6 @@ towards wherever a tessellator happened to put more triangles, so each is weight
 """
 
 import numpy as np
-
 from trunnion_core.arrays import FloatArray, IntArray
 
 LONGEST_STEP = 3.0
@@ -51,4 +50,4 @@ def offset_steps(mean: FloatArray) -> FloatArray:
     cosine only; dividing by the mean cosine gives every facet the whole distance (at most LONGEST_STEP).
     """
     squared = (mean**2).sum(axis=1, keepdims=True)
-    return -mean / np.maximum(squared, np.sqrt(squared) / LONGEST_STEP + 1e-300)
+    return np.asarray(-mean / np.maximum(squared, np.sqrt(squared) / LONGEST_STEP + 1e-300))

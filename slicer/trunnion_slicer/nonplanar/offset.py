@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array
-
 from trunnion_core.arrays import BoolArray, FloatArray, freeze
+
 from trunnion_slicer.nonplanar.patch import Patch
 
 RELAXED_SHARE = 0.05

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray, freeze
 from trunnion_core.mesh import Mesh
+
 from trunnion_slicer.nonplanar.normals import face_normals, mean_normals, offset_steps
 from trunnion_slicer.nonplanar.regions import components
 
@@ -41,7 +41,7 @@ class Patch:
     @property
     def normals(self) -> FloatArray:
         """(n, 3) unit averaged normals, equation 2."""
-        return self.mean / np.linalg.norm(self.mean, axis=1, keepdims=True)
+        return np.asarray(self.mean / np.linalg.norm(self.mean, axis=1, keepdims=True))
 
 
 def split_patches(mesh: Mesh, region: BoolArray, twin: IntArray) -> list[Patch]:

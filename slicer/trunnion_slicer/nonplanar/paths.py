@@ -8,13 +8,12 @@ its share: how many mm of footprint it has to fill across its line, from which t
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from shapely.geometry import MultiPolygon
-
 from trunnion_core.arrays import FloatArray, freeze
 from trunnion_core.bead import bead_spacing
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
+
 from trunnion_slicer.infill import fill
 from trunnion_slicer.nonplanar.normals import face_normals
 from trunnion_slicer.nonplanar.offset import Surfaces
@@ -51,13 +50,15 @@ def flat_paths(stack: Surfaces, layer: int, outline: MultiPolygon, settings: Pri
     ]
     angle = np.radians(settings.nonplanar_fill_angle + 90.0 * layer)
     pitch = spacing * _across_cosine(stack, layer, float(angle))
-    # Half the last wall's spacing, or half a bead where there is no wall; then half of the fill's own.
+    # Inside the last wall's half of the spacing, or where there is no wall, of the bead's round side; then half of the
+    # fill's own spacing, less what it is to run into the wall.
     edge = (width / 2 + (count - 0.5) * spacing) * squeeze if count else (width - spacing) / 2
-    for island in offset(outline, -edge - pitch / 2).geoms:
+    inset = pitch / 2 - settings.infill_overlap / 100 * width
+    for island in offset(outline, -edge - inset).geoms:
         lines = fill(settings.fill_pattern, MultiPolygon([island]), pitch, float(angle))
         length = sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines)
         if length > 0:
-            share = shapely.buffer(island, pitch / 2, join_style="mitre").area / length
+            share = offset(island, inset).area / length
             paths += [FlatPath(line, share, Role.NONPLANAR_INFILL) for line in lines]
     return paths
 

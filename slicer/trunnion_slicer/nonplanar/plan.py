@@ -8,10 +8,9 @@ walls and infill in 2D, `project` lifts them onto their surface, `orient` turns 
 from dataclasses import dataclass
 
 import numpy as np
-
 from trunnion_core.arrays import BoolArray, FloatArray, check_array, freeze
 from trunnion_core.findings import Finding
-from trunnion_core.layers import Bead, Layer
+from trunnion_core.layers import Layer
 from trunnion_core.mesh import Mesh
 from trunnion_core.settings import PrintSettings
 

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import manifold3d
 import numpy as np
-
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.errors import MeshError
 from trunnion_core.mesh import Mesh
+
 from trunnion_slicer.nonplanar.offset import Surfaces
 
 ROOF = 1.0
@@ -56,7 +56,7 @@ def cutter(stack: Surfaces) -> tuple[FloatArray, IntArray]:
     floor = stack.surfaces[-1].copy()
     floor[rim] += SIDE_CLEARANCE * outward
     skin = patch.vertices[rim] + SIDE_CLEARANCE * outward
-    roof = patch.vertices + [0.0, 0.0, ROOF]
+    roof = patch.vertices + np.array([0.0, 0.0, ROOF])
     roof[rim] += LEAN * free + SIDE_CLEARANCE * outward
 
     middle = np.full(count, -1, np.int64)

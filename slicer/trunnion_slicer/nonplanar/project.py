@@ -5,12 +5,12 @@ the surface exactly. Each piece between two points lies in one triangle and take
 from it; at a point, both pieces have a say. Points that do not matter are then dropped.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
 from trunnion_core.arrays import FloatArray, IntArray, freeze
+
 from trunnion_slicer.nonplanar.grid import Grid
 from trunnion_slicer.nonplanar.orient import spread_jumps
 from trunnion_slicer.nonplanar.thin_kernel import thinned
@@ -21,8 +21,11 @@ CHORD = 0.003
 AXIS_CHORD = 0.009
 """Half a degree: how far its tool axis may be off the interpolated one."""
 
-DENSITY_CHORD = 0.03
+DENSITY_CHORD = 0.05
 """Share by which the layer's thickness at it may be off the interpolated one."""
+
+DENSITY_STEP = 0.15
+"""mm. How closely a thickness that changes within triangles is looked up."""
 
 SHORTEST = 0.05
 """mm. Of points nearer than this to each other one is enough: less than the nozzle's flat can follow."""
@@ -49,17 +52,28 @@ class Lifted:
 
 
 def lift(
-    lines: Sequence[FloatArray], grid: Grid, corner_normals: FloatArray, corner_density: FloatArray, blend: float
+    lines: Sequence[FloatArray],
+    grid: Grid,
+    corner_normals: FloatArray,
+    corner_density: FloatArray,
+    blend: float,
+    density_at: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
 ) -> Lifted:
     """Polylines (n, 2) mm on the surface of `grid`.
 
     corner_normals (m, 3, 3) unit and corner_density (m, 3) mm belong to the corners of the grid's triangles. Where
-    the normal jumps at an edge, the tool turns over `blend` mm before and behind it.
+    the normal jumps at an edge, the tool turns over `blend` mm before and behind it. `density_at` (points, normals)
+    replaces the corners' densities by ones that change within a triangle, looked up every DENSITY_STEP.
     """
-    flat = np.concatenate(lines) if lines else np.zeros((0, 2))
+    if not lines:
+        return Lifted(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64))
+    flat = np.concatenate(lines)
     starts = np.concatenate([[0], np.cumsum([len(line) for line in lines])]).astype(np.int64)
     flat, starts = grid.cut(flat, starts)
     points, axes, density, starts = _evaluate(flat, starts, grid, corner_normals, corner_density, blend)
+    if density_at is not None:
+        points, axes, starts = _divided(points, axes, starts)
+        density = density_at(points, axes)
     run = np.zeros(len(points))
     run[1:] = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1) * (density[1:] + density[:-1]) / 2
     run[starts[:-1]] = 0.0
@@ -70,6 +84,22 @@ def lift(
     new_starts = np.searchsorted(rows, starts)
     volume[new_starts[:-1]] = 0.0
     return Lifted(points[rows], axes[rows], volume, new_starts)
+
+
+def _divided(points: FloatArray, axes: FloatArray, starts: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Paths with rows at most DENSITY_STEP apart."""
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    parts = np.ones(len(points), np.int64)
+    parts[:-1] = np.maximum(np.ceil(length / DENSITY_STEP).astype(np.int64), 1)
+    parts[starts[1:] - 1] = 1
+    row = np.repeat(np.arange(len(points)), parts)
+    nth = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
+    t = (nth / parts[row])[:, None]
+    following = np.minimum(row + 1, len(points) - 1)
+    between = np.where(t > 0, (1 - t) * axes[row] + t * axes[following], axes[row])
+    between /= np.linalg.norm(between, axis=1, keepdims=True)
+    divided = np.where(t > 0, (1 - t) * points[row] + t * points[following], points[row])
+    return divided, between, np.concatenate([[0], np.cumsum(parts)])[starts]
 
 
 def _evaluate(
@@ -110,7 +140,7 @@ def _evaluate(
 
 
 def _weights(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Barycentric coordinates (n, 3) of points (n, 2) in triangles (n, 3, 3) from above, a little way beyond at most."""
+    """Barycentric coordinates (n, 3) of points (n, 2) in triangles (n, 3, 3), not far beyond them."""
     a = triangles[:, 1, :2] - triangles[:, 0, :2]
     b = triangles[:, 2, :2] - triangles[:, 0, :2]
     q = points - triangles[:, 0, :2]

@@ -9,10 +9,10 @@ find faces whose material underneath is too thin to carry non-planar layers.
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.mesh import Mesh
 from trunnion_core.settings import PrintSettings
+
 from trunnion_slicer.nonplanar.grid import build_grid
 from trunnion_slicer.nonplanar.normals import face_normals
 
@@ -75,7 +75,7 @@ def _printable(mesh: Mesh, rows: IntArray, cosine: FloatArray, settings: PrintSe
     above, below = build_grid(mesh.triangles).column(points, RAY_CLEARANCE)
     needed = settings.nonplanar_layers * settings.layer_height / cosine + settings.first_height
     bad = np.isfinite(above) | (below < needed[owner] - RAY_CLEARANCE)
-    return np.bincount(owner, bad, len(rows)) == 0
+    return np.asarray(np.bincount(owner, bad, len(rows)) == 0)
 
 
 def _samples(triangles: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -95,7 +95,7 @@ def _samples(triangles: FloatArray) -> tuple[FloatArray, IntArray]:
 
 
 def _smooth_border(region: BoolArray, wide: BoolArray, twin: IntArray) -> BoolArray:
-    """Take in faces of `wide` with two neighbours in the region, let go of steep ones with none but one, twice."""
+    """Take in faces of `wide` that have two neighbours in the region; twice."""
     across = np.where(twin >= 0, twin // 3, 0).reshape(-1, 3)
     known = (twin >= 0).reshape(-1, 3)
     for _ in range(2):

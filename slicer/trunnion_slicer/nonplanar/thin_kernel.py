@@ -50,7 +50,7 @@ def thinned(
         for i in range(first + 1, last):
             if keep[i]:
                 near = ((points[i] - points[previous]) ** 2).sum() < shortest**2
-                if near or ((points[i] - points[last]) ** 2).sum() < shortest**2 and i + 1 == last:
+                if near or (((points[i] - points[last]) ** 2).sum() < shortest**2 and i + 1 == last):
                     keep[i] = False
                 else:
                     previous = i
