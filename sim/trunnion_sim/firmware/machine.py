@@ -61,7 +61,7 @@ class SoftwareMachine:
         self.now = 0.0
         """Simulated seconds since power-up."""
         self.executed: list[str] = []
-        """Every command in the order of execution, without number and checksum."""
+        """Every command that the firmware knew, in the order of execution, without number and checksum."""
         self.advanced_ok = advanced_ok
         self.connected = True
         """False once the cable was pulled."""
@@ -81,10 +81,15 @@ class SoftwareMachine:
     # What the world does to the machine
 
     def receive(self, data: bytes) -> None:
-        """Bytes arrive on the wire, now."""
+        """Bytes arrive on the wire, now and all at once.
+
+        What the queue of four has no room for goes to the receive ring and is lost where that is full. A line error
+        throws away whatever has arrived behind it.
+        """
         if self.halted:
             return
         data = self._faults.up(data, self.now)
+        self._flushed = False
         start = 0
         size = len(data)
         while start < size:
@@ -271,6 +276,7 @@ class SoftwareMachine:
         planner = self.planner
         self._space = Wait(ready=lambda: not planner.full)
         self._ok_said = False
+        self._flushed = False
         self.resend_ok_after: float | None = 0.0
         self.refuses_lines = False
         self.dropped_moves = 0
@@ -284,8 +290,8 @@ class SoftwareMachine:
         urgent = self.emergency.feed(data)
         if urgent is not None:
             self._emergency(*urgent)
-            if self.halted:
-                return
+        if self.halted or self._flushed:
+            return
         if len(self._queue) >= QUEUE or self.ring:
             self.ring.put(data)
         else:
@@ -318,6 +324,7 @@ class SoftwareMachine:
 
     def _ask_again(self, reason: str) -> None:
         last = self.reader.last
+        self._flushed = True
         self.ring.flush()
         self.reader.forget()
         self.say(f"Error:{reason}{last}\nResend: {last + 1}\n")
@@ -335,7 +342,6 @@ class SoftwareMachine:
             if delay is not None:
                 delays.append(delay)
         text = bare(line)
-        self.executed.append(text)
         steps = self._delayed(delays, text) if delays else self._dispatch(text)
         if steps is None:
             self._finish()
@@ -346,8 +352,9 @@ class SoftwareMachine:
         """Run a command; what it still waits for is returned."""
         command = parse(text)
         if command is None:
-            self.say(f'echo:Unknown command: "{text}"\n')
+            self._unknown(text)
             return None
+        self.executed.append(text)
         code = command.code
         if code in ("G1", "G0"):
             if self.dropped_moves:
@@ -363,9 +370,13 @@ class SoftwareMachine:
             return handler(self, command)
         if code.startswith("T"):
             host_codes.select_tool(self, command)
-        else:
-            self.say(f'echo:Unknown command: "{text}"\n')
+            return None
+        self.executed.pop()
+        self._unknown(text)
         return None
+
+    def _unknown(self, text: str) -> None:
+        self.say(f'echo:Unknown command: "{text}"\n')
 
     def _delayed(self, delays: list[Steps], text: str) -> Steps:
         for delay in delays:
