@@ -22,7 +22,8 @@ from trunnion_slicer.beads import flat_bead
 from trunnion_slicer.infill import fill, require
 from trunnion_slicer.sections import sections
 from trunnion_slicer.skirt import skirt
-from trunnion_slicer.walls import as_multipolygon, offset, opened, walls
+from trunnion_slicer.thin import bare, gaps, middle_lines
+from trunnion_slicer.walls import as_multipolygon, offset, opened, rings, wall_lines
 
 FLOW_BAND = (0.8, 1.25)
 """How far the bead of solid infill may depart from its nominal section so that an island gets exactly its volume."""
@@ -32,6 +33,9 @@ SLIVER = 0.1
 
 NARROW_TOP = 3.0
 """Spacings. Strips of top surface narrower than this are filled in one go with the solid infill beside them."""
+
+NARROW_FILL = 0.6
+"""Spacings. Where the lines of a zig-zag would be shorter than this, one bead along the middle does better."""
 
 
 def planar_layers(mesh: Mesh, settings: PrintSettings) -> list[Layer]:
@@ -53,9 +57,13 @@ def planar_layers(mesh: Mesh, settings: PrintSettings) -> list[Layer]:
         width = settings.first_width if index == 0 else settings.extrusion_width
         pass_ = _Pass(index, z, height, width, bead_spacing(width, height), settings)
         beads = skirt(section, settings) if index == 0 else []
-        rings, inside = walls(section, settings.perimeters, width, pass_.spacing)
-        roles = [Role.OUTER_WALL if number == 0 else Role.INNER_WALL for number, _ in rings]
-        beads += [flat_bead(ring, z, width, height, role) for (_, ring), role in zip(rings, roles, strict=True)]
+        lines = wall_lines(section, settings.perimeters, width, pass_.spacing)
+        for number, line in enumerate(lines):
+            role = Role.INNER_WALL if number else Role.OUTER_WALL
+            beads += [flat_bead(ring, z, width, height, role) for ring in rings(line)]
+        for number, gap in enumerate(gaps(section, lines, width, pass_.spacing)):
+            beads += _thin(gap, Role.SOLID_INFILL if number else Role.OUTER_WALL, pass_)
+        inside = offset(lines[-1], -pass_.spacing / 2) if lines else section
         beads += _inside(inside, solid[index], top[index], pass_)
         layers.append(Layer("planar", z, height, tuple(beads)))
     return layers
@@ -148,7 +156,8 @@ def _solid(region: MultiPolygon, role: Role, pass_: _Pass) -> list[Bead]:
     """Beads that fill `region`; every island of lines gets the plastic of its area, within FLOW_BAND."""
     beads = []
     inset = _inset(pass_)
-    for island in _line_area(region, pass_).geoms:
+    islands = opened(_line_area(region, pass_), NARROW_FILL * pass_.spacing / 2)
+    for island in islands.geoms:
         lines = fill("rectilinear", MultiPolygon([island]), pass_.spacing, pass_.angle)
         length = sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines)
         if length == 0:
@@ -157,6 +166,17 @@ def _solid(region: MultiPolygon, role: Role, pass_: _Pass) -> list[Bead]:
         area = np.clip(flow, *FLOW_BAND) * pass_.spacing * pass_.height
         width = float(bead_width(area, np.asarray(pass_.height)))
         beads += [flat_bead(line, pass_.z, width, pass_.height, role) for line in lines]
+    return beads + _thin(bare(region, offset(islands, inset), pass_.width), Role.SOLID_INFILL, pass_)
+
+
+def _thin(region: MultiPolygon, role: Role, pass_: _Pass) -> list[Bead]:
+    """Single beads along the middle of narrow places, each with the plastic of the place it fills."""
+    beads = []
+    for line, wide in middle_lines(region, pass_.width):
+        widths = bead_width(wide * pass_.height, np.full(len(wide), pass_.height))
+        bead = flat_bead(line, pass_.z, pass_.width, pass_.height, role)
+        pieces = np.concatenate([[widths[:2].mean()], (widths[1:] + widths[:-1]) / 2])
+        beads.append(Bead(bead.points, bead.tool_axes, pieces, bead.height, role))
     return beads
 
 

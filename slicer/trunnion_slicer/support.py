@@ -4,9 +4,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import LineString, Polygon
 from trunnion_core.findings import Finding
 from trunnion_core.layers import Layer
+from trunnion_core.roles import Role
 
 from trunnion_slicer.order import islands_of
 
@@ -20,7 +21,7 @@ def unsupported(layers: Sequence[Layer]) -> tuple[Finding, ...]:
 
 
 def _warnings(layers: Sequence[Layer]) -> Iterator[Finding]:
-    below: Sequence[Polygon] = ()
+    below: Sequence[Polygon | LineString] = ()
     for index, layer in enumerate(layers):
         islands = islands_of(layer.beads)
         if index and islands:
@@ -38,4 +39,5 @@ def _warnings(layers: Sequence[Layer]) -> Iterator[Finding]:
                     value=float(islands[row].area),
                     point=(float(place.x), float(place.y), layer.z),
                 )
-        below = islands
+        thin = [bead for bead in layer.beads if bead.role == Role.OUTER_WALL and not bead.closed]
+        below = [*islands, *(LineString(bead.points[:, :2]) for bead in thin)]

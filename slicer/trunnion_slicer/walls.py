@@ -36,8 +36,8 @@ def walls(
     inner edge of the innermost wall; with `count` 0 it is `region` itself. Where nothing fits, nothing is returned.
     """
     lines = wall_lines(as_multipolygon(region), count, width, spacing)
-    rings = [(index, ring) for index, line in enumerate(lines) for ring in _rings(line)]
-    return rings, offset(lines[-1], -spacing / 2) if lines else as_multipolygon(region)
+    found = [(index, ring) for index, line in enumerate(lines) for ring in rings(line)]
+    return found, offset(lines[-1], -spacing / 2) if lines else as_multipolygon(region)
 
 
 def wall_lines(region: MultiPolygon, count: int, width: float, spacing: float) -> list[MultiPolygon]:
@@ -80,7 +80,7 @@ def _fitting(region: MultiPolygon, distance: float, margin: float) -> MultiPolyg
     return as_multipolygon(shapely.intersection(shrunk, wide, grid_size=GRID))
 
 
-def _rings(region: MultiPolygon) -> list[FloatArray]:
-    """Every ring of the region, shells counter-clockwise, holes clockwise."""
+def rings(region: MultiPolygon) -> list[FloatArray]:
+    """Every ring of the region (n, 2) mm, closed, shells counter-clockwise, holes clockwise."""
     oriented = shapely.orient_polygons(region)
     return [np.asarray(ring.coords)[:, :2] for part in oriented.geoms for ring in (part.exterior, *part.interiors)]
