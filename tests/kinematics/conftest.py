@@ -90,8 +90,8 @@ def all_machines() -> dict[str, MachineProfile]:
             [
                 z,
                 rotary("A", "work", [1, 0, 0], [0, 0, -20], 120),
-                linear("X", "work", [-1, 0, 0], -300, 300),
                 rotary("C", "work", [0, 0, 1], [5, 0, 0], None),
+                linear("X", "work", [-1, 0, 0], -300, 300),
                 linear("Y", "work", [0, -1, 0], -300, 300),
             ],
         ),
