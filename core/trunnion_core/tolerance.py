@@ -11,3 +11,12 @@ PARALLEL_AXES = 1e-6
 
 SAME_TOOL_AXIS_DEG = 1e-3
 """Degrees. A machine without rotary joints accepts tool axes this close to its own."""
+
+GAP_CLOSING = 1e-3
+"""mm. Open edges whose ends lie closer than this belong together: exporters round coordinates to three decimals."""
+
+FLAT_HOLE = 1e-2
+"""mm. A hole whose rim lies this close to one plane is capped flat whatever its size: less than any printer shows."""
+
+PLACEMENT_SLACK = 1e-3
+"""mm. How far a part may stick out of the printable space: a part as large as the bed survives a change of units."""
