@@ -32,7 +32,7 @@ def _bed_middle(profile: MachineProfile) -> FloatArray:
     bed = profile.bed
     if bed.min is None or bed.max is None:
         return np.zeros(2)
-    return np.asarray([bed.min, bed.max], dtype=np.float64).mean(axis=0).astype(np.float64)
+    return np.asarray(np.add(bed.min, bed.max) / 2, dtype=np.float64)
 
 
 def _problems(mesh: Mesh, profile: MachineProfile, centered: bool) -> list[str]:

@@ -1,0 +1,45 @@
+"""A steering wheel: a round ring, three arched spokes and a domed hub, whose tops are patches at different heights."""
+
+from typing import Any
+
+import numpy as np
+from trunnion_core.arrays import FloatArray
+from trunnion_core.mesh import Mesh
+
+from trunnion.samples._solids import dome, from_manifold, sheet, to_manifold
+
+SETTINGS: dict[str, Any] = {}
+
+RING_RADIUS, RING_HALF, HUB_RADIUS = 17.5, 3.4, 6.0
+"""mm: middle of the ring, half its width, and the hub."""
+
+
+def make() -> Mesh:
+    """42 mm across and 10 mm high; ring, spokes and hub top out at 10, 4.6 and 7 mm."""
+    from manifold3d import CrossSection, Manifold, OpType
+
+    section = CrossSection([_profile()])
+    ring = Manifold.revolve(section, 132)
+    spoke = to_manifold(_spoke())
+    spokes = [spoke.rotate([0.0, 0.0, turn]) for turn in (0.0, 120.0, 240.0)]
+    return from_manifold(Manifold.batch_boolean([ring, to_manifold(_hub()), *spokes], OpType.Add))
+
+
+def _profile() -> FloatArray:
+    """The ring's section: upright flanks and an arched top."""
+    s = np.linspace(1.0, -1.0, 19)
+    top = 6.2 + 3.8 * np.sqrt(1.0 - (0.96 * s) ** 2)
+    arch = np.column_stack([RING_RADIUS + RING_HALF * s, top])
+    feet = np.array([[RING_RADIUS - RING_HALF, 0.0], [RING_RADIUS + RING_HALF, 0.0]])
+    return np.vstack([feet, arch])
+
+
+def _spoke() -> Mesh:
+    x, y = np.meshgrid(np.linspace(4.0, 15.6, 20), np.linspace(-2.6, 2.6, 11), indexing="ij")
+    return sheet(x, y, 4.6 - 0.16 * y * y + 0.004 * (x - 10.0) ** 2)
+
+
+def _hub() -> Mesh:
+    angle = np.arange(64) * (2 * np.pi / 64)
+    outline = HUB_RADIUS * np.column_stack([np.cos(angle), np.sin(angle)])
+    return dome(outline, lambda x, y: 7.0 - 1.3 * (x * x + y * y) / HUB_RADIUS**2, rings=10)
