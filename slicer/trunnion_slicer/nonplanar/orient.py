@@ -6,13 +6,16 @@ are nearly parallel to its own, and along a path that crosses the crease the too
 """
 
 import numpy as np
-from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.arrays import FloatArray, IntArray
 
 from trunnion_slicer.nonplanar.normals import corner_angles, face_normals
 from trunnion_slicer.nonplanar.patch import Patch
 
 CREASE_DEG = 20.0
 """Degrees between facets from which on each keeps its own normal at their common corner."""
+
+CREASE_JUMP = 0.035
+"""Two degrees: a larger step of the tool axis at a point is spread over the path before and behind it."""
 
 PASSES = 128
 """Rounds of smoothing: the tool's turns spread over about a dozen points of the path."""
@@ -47,13 +50,17 @@ def corner_normals(patch: Patch) -> FloatArray:
 
 
 def spread_jumps(
-    points: FloatArray, axes: FloatArray, density: FloatArray, starts: IntArray, jump: BoolArray, blend: float
+    points: FloatArray, arriving: FloatArray, leaving: FloatArray, density: FloatArray, starts: IntArray, blend: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
-    """Turn the tool evenly over `blend` mm before and behind every row where its axis jumps.
+    """Points, one axis each, densities and starts, the tool turning evenly over `blend` mm around every jump.
 
-    points (n, 3), axes (n, 3), density (n,) of paths starts[i] : starts[i + 1]; rows are added where the turning
-    begins and ends.
+    points (n, 3), density (n,) of paths starts[i] : starts[i + 1]; arriving and leaving (n, 3) unit are the axes at
+    the end of the piece before a row and at the start of the one behind. Rows are added where the turning begins and
+    ends.
     """
+    axes = arriving + leaving
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    jump = np.linalg.norm(arriving - leaving, axis=1) > CREASE_JUMP
     if not jump.any():
         return points, axes, density, starts
     along = np.zeros(len(points))
@@ -70,23 +77,26 @@ def spread_jumps(
     distance = np.minimum(np.abs(along[nearest] - added), np.abs(along[nearest - 1] - added))
     added = added[distance > 1e-3]
     place = np.searchsorted(along, added)
-    values = np.column_stack([points, axes, density])
-    between = np.stack([np.interp(added, along, column) for column in values.T], axis=1)
-    values = np.insert(values, place, between, axis=0)
+    straight = np.column_stack([points, density])
+    between = [np.interp(added, along, column) for column in straight.T]
+    # Axes run from one row's leaving to the next one's arriving.
+    twice, sides = np.repeat(along, 2), np.stack([arriving, leaving], axis=1).reshape(-1, 3)
+    between += [np.interp(added, twice, axis) for axis in sides.T]
+    values = np.insert(np.column_stack([straight, axes]), place, np.stack(between, axis=1), axis=0)
     turned = np.insert(along, place, added)
 
     # Rows within reach of a jump take the axis between those at the two ends of its reach.
-    ends = np.stack([[np.interp(s, along, axis) for axis in axes.T] for s in (before, behind)])
+    ends = np.stack([[np.interp(s, twice, axis) for axis in sides.T] for s in (before, behind)])
     right = np.clip(np.searchsorted(centre, turned), 0, len(centre) - 1)
     left = np.maximum(right - 1, 0)
     near = np.where(np.abs(centre[left] - turned) < np.abs(centre[right] - turned), left, right)
     inside = (turned > before[near]) & (turned < behind[near])
     which = near[inside]
     t = ((turned[inside] - before[which]) / (behind[which] - before[which]))[:, None]
-    values[inside, 3:6] = (1 - t) * ends[0].T[which] + t * ends[1].T[which]
-    values[:, 3:6] /= np.linalg.norm(values[:, 3:6], axis=1, keepdims=True)
+    values[inside, 4:] = (1 - t) * ends[0].T[which] + t * ends[1].T[which]
+    values[:, 4:] /= np.linalg.norm(values[:, 4:], axis=1, keepdims=True)
     moved = starts + np.searchsorted(place, starts, side="left")
-    return values[:, :3], values[:, 3:6], values[:, 6], moved
+    return values[:, :3], values[:, 4:], values[:, 3], moved
 
 
 def smoothed(points: FloatArray, axes: FloatArray, starts: IntArray, tolerance: float) -> FloatArray:

@@ -33,7 +33,7 @@ class Patch:
     border: IntArray
     """(b, 2) edges of the border, the patch on the left seen from above."""
     outside: FloatArray
-    """(b, 3) unit normal of the mesh's face across each border edge."""
+    """(b, 3) unit normal of the mesh's face across each border edge; of its own face where there is none."""
 
     def __post_init__(self) -> None:
         freeze(self.rows, self.vertices, self.faces, self.mean, self.steps, self.border, self.outside)
@@ -68,7 +68,7 @@ def _patch(mesh: Mesh, rows: IntArray, twin: IntArray, normal: FloatArray) -> Pa
 
     edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     rim = across < 0
-    outside = np.where((opposite >= 0)[:, None], normal[np.maximum(opposite, 0) // 3], [0.0, 0.0, 1.0])[rim]
+    outside = normal[np.where(opposite >= 0, opposite, half) // 3][rim]
     mean = mean_normals(vertices, faces)
     steps = offset_steps(mean)
     _end_on_walls(steps, mean, edges[rim], outside)

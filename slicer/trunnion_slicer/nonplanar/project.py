@@ -30,9 +30,6 @@ DENSITY_STEP = 0.15
 SHORTEST = 0.05
 """mm. Of points nearer than this to each other one is enough: less than the nozzle's flat can follow."""
 
-CREASE_JUMP = 0.035
-"""Two degrees: a larger step of the tool axis at a point is spread over the path before and behind it."""
-
 
 @dataclass(frozen=True, eq=False)
 class Lifted:
@@ -116,27 +113,25 @@ def _evaluate(
     into[starts[:-1]] = False
     end = np.flatnonzero(into)
     triangle, _ = grid.locate((flat[end] + flat[end - 1]) / 2)
-    values = np.zeros((count, 5))
-    says = np.zeros(count)
-    jump = np.zeros((count, 3))
-    for row, sign in ((end - 1, 1.0), (end, -1.0)):
+    height, thickness, says = np.zeros(count), np.zeros(count), np.zeros(count)
+    leaving, arriving = np.zeros((count, 3)), np.zeros((count, 3))
+    for row, axis in ((end - 1, leaving), (end, arriving)):
         weights = _weights(flat[row], grid.triangles[triangle])
-        height = (weights * grid.triangles[triangle][:, :, 2]).sum(axis=1)
-        normal = np.einsum("nk,nkd->nd", weights, corner_normals[triangle])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        density = (weights * corner_density[triangle]).sum(axis=1)
-        values[row] += np.column_stack([height, normal, density])
+        height[row] += (weights * grid.triangles[triangle][:, :, 2]).sum(axis=1)
+        thickness[row] += (weights * corner_density[triangle]).sum(axis=1)
         says[row] += 1
-        jump[row] += sign * normal
+        normal = np.einsum("nk,nkd->nd", weights, corner_normals[triangle])
+        axis[row] = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    # A closed path arrives at its first row from its last piece; an open one starts and ends as it goes on.
     first, last = starts[:-1], starts[1:] - 1
     closed = (flat[first] == flat[last]).all(axis=1)
-    both = values[first[closed]] + values[last[closed]]
-    values[first[closed]] = values[last[closed]] = both / 2
-    values /= np.maximum(says, 1.0)[:, None]
-    points = np.column_stack([flat, values[:, 0]])
-    axes = values[:, 1:4] / np.linalg.norm(values[:, 1:4], axis=1, keepdims=True)
-    crease = (says == 2) & (np.linalg.norm(jump, axis=1) > CREASE_JUMP)
-    return spread_jumps(points, axes, values[:, 4], starts, crease, blend)
+    arriving[first] = np.where(closed[:, None], arriving[last], leaving[first])
+    leaving[last] = np.where(closed[:, None], leaving[first], arriving[last])
+    for value in (height, thickness, says):
+        value[first[closed]] = value[last[closed]] = value[first[closed]] + value[last[closed]]
+    says = np.maximum(says, 1.0)
+    points = np.column_stack([flat, height / says])
+    return spread_jumps(points, arriving, leaving, thickness / says, starts, blend)
 
 
 def _weights(points: FloatArray, triangles: FloatArray) -> FloatArray:
