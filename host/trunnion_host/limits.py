@@ -15,7 +15,7 @@ class Limits:
     """Without a byte for so long after a Resend, everything about the lost lines has arrived."""
     resync: float = 0.5
     """After so long a Resend is served though the printer keeps talking."""
-    ask_after: float = 1.0
+    ask_after: float = 0.8
     """Without an ok or a sign of work for so long, ask; again after twice as long each time."""
     asks: int = 4
     """Unanswered questions at once: together they fit the receive ring."""

@@ -85,12 +85,13 @@ class Sender:
         self._in_flight: deque[tuple[int, int]] = deque()
         self._bytes_in_flight = 0
         self._slow = True
-        self._asked: int | None = None
+        self._asks: deque[int] = deque()
+        self._owed: deque[int] = deque()
         self._want_ask = False
         self._verified = 0
         self._unanswered_asks = 0
         self._again = (0, 0)
-        self._doubted: int | None = None
+        self._doubted = (0, 0)
         self._recent_resends: deque[int] = deque(maxlen=5)
         self._buffer = bytearray()
         self._out = bytearray()
@@ -191,19 +192,33 @@ class Sender:
             self.heaters.update(temperatures(reply.text))
         if self.state is State.GREETING:
             self._greeting_ok(reply)
-        elif reply.kind is Kind.OK_REPORT and self._asked is not None:
-            asked, self._asked, self._slow = self._asked, None, False
-            self._verified = max(self._verified, asked)
-            self._doubted = None
-            self._believe(asked)
-            if self.state is State.RESYNC:
-                self._to(State.STREAMING)
+        elif reply.kind is Kind.OK_REPORT and (self._owed or self._asks):
+            self._answer()
         elif reply.number is not None and self._acked < reply.number < self._next_number:
             self._believe(reply.number)
         elif self.state is not State.RESYNC:
             for _ in range(reply.count):
                 self._one_ok()
         self._end_if_complete()
+
+    def _answer(self) -> None:
+        """A question was answered. Answers keep their order, so the oldest open question at least was taken.
+
+        Only if no other question is open is it known which one this answers, and so how many lines are under way.
+        """
+        if self._owed:
+            self._verified = max(self._verified, self._owed.popleft())
+            return
+        number = self._asks.popleft()
+        self._verified = max(self._verified, number)
+        if self._asks:
+            self._one_ok()
+            return
+        self._slow = False
+        self._doubted = (0, 0)
+        self._believe(number)
+        if self.state is State.RESYNC:
+            self._to(State.STREAMING)
 
     def _one_ok(self) -> None:
         """The oldest line under way was taken, as far as counting goes."""
@@ -212,19 +227,19 @@ class Sender:
             return
         number, size = self._in_flight.popleft()
         self._bytes_in_flight -= size
-        if self._asked is not None and number >= self._asked:
+        if self._asks and number >= self._asks[0]:
             self._plain_answer(number)
-        if number > self._acked:
+        if self._acked < number < self._next_number:
             self._take(number)
 
     def _plain_answer(self, number: int) -> None:
         """A question was answered without temperatures: by a firmware that has none, or the answer was damaged."""
-        asked = self._asked
         self._slow = False
-        if not self.heaters and number == asked:
-            self._verified, self._asked = max(self._verified, number), None
-        elif asked is not None and number > asked + self.limits.window_lines:
-            self._asked = None
+        if not self.heaters and number == self._asks[0]:
+            self._verified = max(self._verified, self._asks.popleft())
+        elif number > self._asks[-1] + self.limits.window_lines:
+            self._asks.clear()
+            self._owed.clear()
 
     def _believe(self, number: int) -> None:
         """The firmware has taken everything up to `number`; what was sent after that is still under way."""
@@ -264,27 +279,40 @@ class Sender:
         elif number == self._next_number:
             if any(n >= number for n, _ in self._in_flight):
                 self._believe(number - 1)  # an answer to a question that overtook this line
-        elif number <= self._acked and self._doubted != number:
-            self._doubted = number
-            self._ask()
-        elif number <= max(self._verified, self._acked - self.limits.memory):
-            self._restarted(f"it asks for line number {number} though it had taken {self._acked}")
+        elif number <= self._acked:
+            self._doubt(number)
         else:
             self._go_back(number)
 
+    def _doubt(self, number: int) -> None:
+        """A line that was taken, as far as is known, is asked for: ask back, and believe what is said again and again.
+
+        A line known to have been taken cannot be missing from a firmware that still has its state.
+        """
+        times = self._doubted[1] + 1 if self._doubted[0] == number else 1
+        self._doubted = (number, times)
+        gone = number <= max(self._verified, self._acked - self.limits.memory)
+        if gone and times >= 3:
+            self._restarted(f"it asks for line number {number} though it had taken {self._acked}")
+        elif not gone and times >= 2:
+            self._go_back(number)
+        else:
+            self._ask()
+
     def _go_back(self, number: int) -> None:
         """Send from `number` on again, one line at a time until a question is answered."""
-        self._doubted = None
+        self._doubted = (0, 0)
         self._recent_resends.append(number)
         crowded = len(self._recent_resends) == 5 and number - self._recent_resends[0] < self.limits.crowded
         if crowded and self.window_lines > 1:
             self.window_lines -= 1  # lost this often: more is under way than the firmware can hold
             self._recent_resends.clear()
-        self._acked = number - 1
+        self._take(number - 1)
         self._next_number = number
         self._in_flight.clear()
         self._bytes_in_flight = 0
-        self._asked = None
+        self._owed.extend(asked for asked in self._asks if asked < number)
+        self._asks.clear()
         self._slow = self._want_ask = True
         if self.state is State.STREAMING:
             self._to(State.RESYNC)
@@ -368,7 +396,7 @@ class Sender:
 
     def _stalled(self) -> bool:
         """Whether an answer is overdue and the wire can take one more question."""
-        waiting = bool(self._in_flight) or self._asked is not None
+        waiting = bool(self._in_flight or self._asks)
         patience = self.limits.ask_after * 2**self._unanswered_asks
         overdue = self._now - max(self._moved, self._asked_at) > patience
         return waiting and overdue and self._unanswered_asks < self.limits.asks
@@ -401,7 +429,7 @@ class Sender:
 
     def _next_index(self) -> int | None:
         """What gets the next number: a question that is due, else a line of the program, else nothing."""
-        if self._want_ask and self._asked is None:
+        if self._want_ask and not self._asks:
             return ASK
         if self.paused and self.state is State.STREAMING:
             return None
@@ -421,7 +449,8 @@ class Sender:
         if not self._in_flight:
             self._moved = self._now
         if self._log[number] == ASK:
-            self._asked, self._asked_at, self._want_ask = number, self._now, False
+            self._asks.append(number)
+            self._asked_at, self._want_ask = self._now, False
             self.questions += 1
         elif self._log[number] == self._end_of_feed - 1:
             self._last_needed = number
@@ -452,7 +481,7 @@ class Sender:
                 self._to(State.DONE)
             elif self.state is State.STOPPING:
                 self._end(self.reason)
-        elif self._asked is None:
+        elif not self._asks:
             self._want_ask = True
 
     def _abandon(self, reason: str) -> None:
