@@ -81,16 +81,17 @@ def test_a_long_part_is_turned_to_the_long_side(paths):
     assert exact.index(True) * 5 == abs(found.turn_deg)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_place_is_found_exactly_when_trying_every_place_finds_one(paths, seed):
+@pytest.mark.parametrize("kind", ["ab", "bc"])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_place_is_found_exactly_when_trying_every_place_finds_one(machines, kind, seed):
     """A machine so tight that only few places hold, or none."""
     rng = np.random.default_rng(seed)
-    profile = paths["bc"]()
-    low, high = rng.uniform(15, 40, 2)
+    profile = machines[kind]
+    low, high = rng.uniform(14, 36, 2)
     joints = tuple(replace(joint, min=-low, max=high) if joint.letter in "XY" else joint for joint in profile.joints)
     tight = replace(profile, joints=joints)
     points = rng.uniform(-25, 25, (6, 3)) + np.append(rng.uniform(-30, 30, 2), 30)
-    axes = rng.normal(size=(6, 3)) * 0.4 + [0, 0, 1]
+    axes = rng.normal(size=(6, 3)) * (0.2 if kind == "ab" else 0.4) + [0, 0, 1]
     poses = Poses(points, axes / np.linalg.norm(axes, axis=1, keepdims=True))
     try:
         found = place(poses, tight)
