@@ -7,6 +7,9 @@ import numpy as np
 from trunnion_core.arrays import FloatArray
 from trunnion_core.mesh import Mesh
 
+SLIVER = 5e-4
+"""mm. How far simplification may move the surface: less than the sag of any facet here."""
+
 Height = Callable[[FloatArray, FloatArray], FloatArray]
 
 
@@ -105,8 +108,8 @@ def to_manifold(mesh: Mesh) -> Any:
 
 
 def from_manifold(solid: Any) -> Mesh:
-    """A manifold3d solid as a mesh."""
-    out = solid.to_mesh64()
+    """A manifold3d solid as a mesh, without the slivers that Booleans leave."""
+    out = solid.simplify(SLIVER).to_mesh64()
     vertices = np.array(out.vert_properties, dtype=np.float64)[:, :3].copy()
     return Mesh(vertices, np.array(out.tri_verts, dtype=np.int64))
 
