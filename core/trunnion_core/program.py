@@ -44,6 +44,9 @@ class MachineProgram:
     source: IntArray
     """(n,) row of the toolpath whose motion this is a part of; -1 for what motion inserted."""
     events: tuple[Event, ...] = field(default=())
+    cruise: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """(n,) s that the row would take at the highest speed it reaches, for a firmware that makes its own ramps: feed
+    words come from this, the time of the print from `duration`. Empty where nobody worked it out."""
 
     def __post_init__(self) -> None:
         n, k = self.joints.shape
@@ -62,9 +65,11 @@ class MachineProgram:
         )
         for name in per_row:
             check_array(name, getattr(self, name), (n,))
+        if self.cruise.size:
+            check_array("cruise", self.cruise, (n,))
         if n and self.duration.min() < 0:
             raise ValueError(f"duration: row {int(self.duration.argmin())} is negative")
-        freeze(self.joints, self.start, *(getattr(self, name) for name in per_row))
+        freeze(self.joints, self.start, self.cruise, *(getattr(self, name) for name in per_row))
 
     def __len__(self) -> int:
         return len(self.joints)

@@ -85,6 +85,7 @@ def plan_motion(toolpath: Toolpath, profile: MachineProfile, settings: PrintSett
         tip_length=tip_length,
         source=rows.source,
         events=events_for(rows.layer, profile, settings),
+        cruise=law.cruise,
     )
     findings = (*findings, *flow_findings(program, law, rows.points, profile))
     return PlanResult(program, findings, rows.points, rows.tool_axes, law)

@@ -112,7 +112,9 @@ def test_no_joint_leaves_its_limits_or_caps(profile, dome, settings):
     assert (ramp.max(axis=1)[:, None] * np.abs(rate) <= profile.array("acceleration") * 1.001).all()
     assert_allclose(program.duration[moving], times[moving, -1], rtol=1e-9)
     beads = program.width > 0
-    assert (program.tip_length[beads] / program.duration[beads] <= program.tip_speed[beads] * (1 + 1e-9)).all()
+    assert (program.tip_length[beads] / program.cruise[beads] <= program.tip_speed[beads] * (1 + 1e-9)).all()
+    assert (program.cruise <= program.duration * (1 + 1e-9)).all()
+    assert (np.abs(steps[moving]) / program.cruise[moving][:, None] <= profile.array("speed") * (1 + 1e-9)).all()
 
 
 def test_retractions_bracket_the_travels(profile, dome, settings):
