@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray, check_array, freeze
 
 EventKind = Literal["nozzle_temperature", "bed_temperature", "wait_nozzle", "wait_bed", "fan", "layer", "pause"]
