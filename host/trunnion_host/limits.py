@@ -17,6 +17,8 @@ class Limits:
     """After so long a Resend is served though the printer keeps talking."""
     ask_after: float = 0.8
     """Without an ok or a sign of work for so long, ask; again after twice as long each time."""
+    answers: float = 0.15
+    """Without a byte for so long after the answer to one of several questions, the others' answers are lost."""
     asks: int = 4
     """Unanswered questions at once: together they fit the receive ring."""
     silence: float = 120.0

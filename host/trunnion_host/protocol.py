@@ -87,6 +87,7 @@ class Sender:
         self._slow = True
         self._asks: deque[int] = deque()
         self._owed: deque[int] = deque()
+        self._answers_missing = False
         self._want_ask = False
         self._verified = 0
         self._unanswered_asks = 0
@@ -133,7 +134,8 @@ class Sender:
     def receive(self, data: bytes, now: float) -> bytes:
         """Bytes that came from the firmware, in pieces of any size."""
         self._pass_time(now)
-        self._heard = now
+        if data:
+            self._heard = now
         self._buffer += data
         *lines, rest = self._buffer.split(b"\n")
         self._buffer = rest if len(rest) < LONGEST_REPLY else bytearray()
@@ -212,10 +214,16 @@ class Sender:
         number = self._asks.popleft()
         self._verified = max(self._verified, number)
         if self._asks:
+            self._answers_missing = True
             self._one_ok()
-            return
-        self._slow = False
+        else:
+            self._settle(number)
+
+    def _settle(self, number: int) -> None:
+        """Counting starts afresh: the question `number` and all before it were taken."""
+        self._slow = self._answers_missing = False
         self._doubted = (0, 0)
+        self._asks.clear()
         self._believe(number)
         if self.state is State.RESYNC:
             self._to(State.STREAMING)
@@ -272,9 +280,9 @@ class Sender:
         count = self._again[1] + 1 if number == self._again[0] else 1
         self._again = (number, count)
         if count >= self.limits.resends:
-            what = f"never sent, number {number}" if number >= len(self._log) else f"'{self._text(number)}'"
+            what = f"'{self._text(number)}'" if number < len(self._log) else f"number {number}, which was never sent"
             self._end(f"the printer asked {count} times in a row for the line {what}")
-        elif number > self._next_number:
+        elif number > len(self._log):
             self._want_ask = True
         elif number == self._next_number:
             if any(n >= number for n, _ in self._in_flight):
@@ -388,6 +396,9 @@ class Sender:
         elif self.state is State.RESYNC:
             if now - self._heard >= limits.quiet or now - self._since > limits.resync:
                 self._to(State.STREAMING)
+        elif self._answers_missing and self._asks and now - self._heard >= limits.answers:
+            self._settle(self._asks[-1])  # answers come together; what has not come by now is lost
+            self._end_if_complete()
         elif self._stalled():
             self._unanswered_asks += 1
             self._ask()
