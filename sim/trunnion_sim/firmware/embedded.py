@@ -68,8 +68,8 @@ class EmbeddedPort:
         deadline = time.monotonic() + timeout
         with self._changed:
             while True:
-                self._check()
                 self._out += self.machine.advance(self._pace.elapsed())
+                self._check()
                 if self._out:
                     said = bytes(self._out)
                     self._out.clear()

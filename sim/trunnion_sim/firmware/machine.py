@@ -86,7 +86,7 @@ class SoftwareMachine:
         What the queue of four has no room for goes to the receive ring and is lost where that is full. A line error
         throws away whatever has arrived behind it.
         """
-        if self.halted:
+        if self.halted or not self.connected:
             return
         data = self._faults.up(data, self.now)
         self._flushed = False
@@ -160,7 +160,8 @@ class SoftwareMachine:
 
     def take(self) -> bytes:
         """What the machine has said since the last time."""
-        return self._out.take()
+        said = self._out.take()
+        return said if self.connected else b""
 
     @property
     def working(self) -> bool:
