@@ -22,6 +22,9 @@ from trunnion_slicer.beads import reversed_bead, started_at
 SEAM_REACH = 2.0
 """mm. How far from the seam of the last layer a loop may pass and still take it over."""
 
+EDGE = 1e-3
+"""mm. A way along the centre line of the outer wall is inside the island."""
+
 PHASES: tuple[tuple[Role, ...], ...] = (
     (Role.SKIRT,),
     (Role.INNER_WALL,),
@@ -38,7 +41,10 @@ OUTER = (Role.OUTER_WALL, Role.NONPLANAR_OUTER_WALL)
 
 @dataclass(frozen=True, eq=False)
 class OrderedLayer:
-    """Beads as they will be laid; bead i lies in islands[island[i]], in none where that is -1."""
+    """Beads as they will be laid; bead i lies in islands[island[i]], in none where that is -1.
+
+    Islands are grown by EDGE and prepared for questions.
+    """
 
     beads: tuple[Bead, ...]
     island: IntArray
@@ -71,7 +77,9 @@ def ordered(layer: Layer, tip: FloatArray, seams: FloatArray) -> OrderedLayer:
                     new_seams.append(tip)
         del todo[island]
     found = np.array(new_seams) if new_seams else np.empty((0, 3))
-    return OrderedLayer(tuple(beads), np.array(owner, dtype=np.int64), tuple(islands), found)
+    grown = [island.buffer(EDGE) for island in islands]
+    shapely.prepare(grown)
+    return OrderedLayer(tuple(beads), np.array(owner, dtype=np.int64), tuple(grown), found)
 
 
 def islands_of(beads: Sequence[Bead]) -> list[Polygon]:

@@ -9,14 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry import MultiPolygon
-from trunnion_core.arrays import FloatArray
+from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.bead import bead_spacing, bead_width
 from trunnion_core.errors import MeshError, PlacementError
 from trunnion_core.layers import Bead, Layer
 from trunnion_core.mesh import Mesh
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
+from trunnion_core.tolerance import WELD_DISTANCE
 
 from trunnion_slicer.beads import flat_bead
 from trunnion_slicer.infill import fill, require
@@ -24,6 +26,9 @@ from trunnion_slicer.sections import sections
 from trunnion_slicer.skirt import skirt
 from trunnion_slicer.thin import bare, gaps, middle_lines
 from trunnion_slicer.walls import as_multipolygon, offset, opened, rings, wall_lines
+
+Areas = NDArray[np.object_]
+"""(n,) regions of shapely."""
 
 FLOW_BAND = (0.8, 1.25)
 """How far the bead of solid infill may depart from its nominal section so that an island gets exactly its volume."""
@@ -105,28 +110,43 @@ def _levels(mesh: Mesh, settings: PrintSettings) -> tuple[FloatArray, FloatArray
 def _skins(slices: list[MultiPolygon], settings: PrintSettings) -> tuple[list[MultiPolygon], list[MultiPolygon]]:
     """Of every section: what has to be solid, and what of it faces up."""
     here = np.array(slices, dtype=object)
-    open_above = [shapely.difference(here, cover) for cover in _covers(here, settings.top_solid_layers, up=True)]
-    open_below = [shapely.difference(here, cover) for cover in _covers(here, settings.bottom_solid_layers, up=False)]
+    above = _covers(here, settings.top_solid_layers, up=True)
+    below = _covers(here, settings.bottom_solid_layers, up=False)
     nothing = np.full(len(here), MultiPolygon(), dtype=object)
-    solid = nothing
-    for exposed in (open_above[-1:], open_below[-1:]):
-        if exposed:
-            solid = shapely.union(solid, exposed[0])
-    top = open_above[0] if open_above else nothing
+    top = _without(here, above[0]) if above else nothing
+    roof = _without(here, above[-1]) if above else nothing
+    floor = _without(here, below[-1]) if below else nothing
+    solid = shapely.union(roof, floor)
     return [as_multipolygon(part) for part in solid], [as_multipolygon(part) for part in top]
 
 
-def _covers(here: "np.typing.NDArray[np.object_]", count: int, *, up: bool) -> list["np.typing.NDArray[np.object_]"]:
+def _covers(here: Areas, count: int, *, up: bool) -> list[Areas]:
     """What 1, 2, ... `count` neighbours on one side of every section have in common."""
-    covers: list[np.typing.NDArray[np.object_]] = []
+    covers: list[Areas] = []
     for distance in range(1, min(count, len(here)) + 1):
         neighbour = np.full(len(here), MultiPolygon(), dtype=object)
         if up:
             neighbour[:-distance] = here[distance:]
         else:
             neighbour[distance:] = here[:-distance]
-        covers.append(shapely.intersection(covers[-1], neighbour) if covers else neighbour)
+        if covers:
+            cover, differ = covers[-1].copy(), ~_same(covers[-1], neighbour)
+            cover[differ] = shapely.intersection(cover[differ], neighbour[differ])
+            neighbour = cover
+        covers.append(neighbour)
     return covers
+
+
+def _without(areas: Areas, covers: Areas) -> Areas:
+    bare = np.full(len(areas), MultiPolygon(), dtype=object)
+    differ = ~_same(areas, covers)
+    bare[differ] = shapely.difference(areas[differ], covers[differ])
+    return bare
+
+
+def _same(areas: Areas, others: Areas) -> BoolArray:
+    """Where both are the same vertex by vertex, as sections of upright walls are: asking is cheaper than clipping."""
+    return np.asarray(shapely.equals_exact(areas, others, WELD_DISTANCE))
 
 
 def _inside(inside: MultiPolygon, solid: MultiPolygon, top: MultiPolygon, pass_: _Pass) -> list[Bead]:
@@ -142,7 +162,7 @@ def _inside(inside: MultiPolygon, solid: MultiPolygon, top: MultiPolygon, pass_:
         solid_part = as_multipolygon(inside.difference(sparse)) if not exposed.is_empty else MultiPolygon()
         sparse = inside if exposed.is_empty else sparse
     upper = opened(inside.intersection(top), NARROW_TOP * pass_.spacing / 2)
-    under = opened(solid_part.difference(upper), pass_.spacing / 2) if not upper.is_empty else solid_part
+    under = opened(solid_part.difference(upper), pass_.spacing) if not upper.is_empty else solid_part
     upper = as_multipolygon(solid_part.difference(under)) if not upper.is_empty else upper
     beads = _solid(upper, Role.TOP_SOLID_INFILL, pass_) + _solid(under, Role.SOLID_INFILL, pass_)
     if settings.fill_density > 0 and not sparse.is_empty:

@@ -73,6 +73,7 @@ def _simplified(points: FloatArray, starts: IntArray) -> list[FloatArray]:
     if count <= 0:
         return []
     lengths = np.diff(starts)
+    points = _from_a_corner(points, starts)
     closed = np.insert(points, starts[1:], points[starts[:-1]], axis=0)
     owner = np.repeat(np.arange(count), lengths + 1)
     lines = shapely.linestrings(closed, indices=owner)
@@ -80,6 +81,22 @@ def _simplified(points: FloatArray, starts: IntArray) -> list[FloatArray]:
         shapely.simplify(lines, SIMPLIFY, preserve_topology=False), return_index=True
     )
     return np.split(coordinates, np.searchsorted(index, np.arange(1, count)))
+
+
+def _from_a_corner(points: FloatArray, starts: IntArray) -> FloatArray:
+    """Each contour begun at its furthest point in one odd direction: a true corner, which simplifying may keep.
+
+    A contour is found where it crosses some triangle, in the middle of a wall. Begun there, equal sections of a prism
+    would all have one more vertex, and each another.
+    """
+    lengths = np.diff(starts)
+    reach = points @ np.array([np.cos(1.0), np.sin(1.0)])
+    owner = np.repeat(np.arange(len(lengths)), lengths)
+    furthest = np.flatnonzero(reach == np.maximum.reduceat(reach, starts[:-1])[owner])
+    corner = furthest[np.unique(owner[furthest], return_index=True)[1]]
+    nth = np.arange(len(points)) - starts[owner]
+    rolled: FloatArray = points[starts[owner] + (corner[owner] - starts[owner] + nth) % lengths[owner]]
+    return rolled
 
 
 def _islands(rings: Sequence[FloatArray]) -> MultiPolygon:

@@ -17,8 +17,8 @@ from trunnion_slicer.walls import as_multipolygon, offset, opened
 SAMPLE = 0.1
 """mm between points along the outline: finer than the narrowest bead, so that the axis does not jump sides."""
 
-NARROWEST = 0.5
-"""Share of the width that a bead may shrink to; a nozzle draws thinner ones apart."""
+NARROWEST = 0.35
+"""Share of the width below which a place is left to the beads beside it: they squeeze into it."""
 
 WAVER = 0.02
 """mm. How far the axis of sampled points may be straightened."""

@@ -37,7 +37,7 @@ def travel(
 ) -> Travel:
     """The way from the end of `last` to the start of `following`; no rows where they meet.
 
-    `within` is the island both beads lie in, None when they do not share one.
+    `within` is the island both beads lie in (see `order.OrderedLayer`), None when they do not share one.
     """
     start, end = last.points[-1], following.points[0]
     from_axis, to_axis = last.tool_axes[-1], following.tool_axes[0]
@@ -79,11 +79,7 @@ def _may_link(last: Bead, following: Bead, within: Polygon, settings: PrintSetti
     if not hidden and np.linalg.norm(end - start) >= settings.retract_before_travel:
         return False
     way = shapely.linestrings(np.array([start[:2], end[:2]]))
-    return bool(shapely.covers(within.buffer(EDGE), way))
-
-
-EDGE = 1e-3
-"""mm. A link may run along the centre line of the outer wall."""
+    return bool(shapely.covers(within, way))
 
 
 def _rows(role: Role, start: FloatArray, axis: FloatArray, *stops: tuple[FloatArray, FloatArray]) -> Travel:

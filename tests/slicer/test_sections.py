@@ -3,6 +3,7 @@
 import manifold3d as m3
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from trunnion_core.errors import MeshError
@@ -96,3 +97,10 @@ def test_a_mesh_with_a_hole_is_refused_with_the_place() -> None:
     mesh = to_mesh(m3.Manifold.cube((10, 10, 10)))
     with pytest.raises(MeshError, match=r"has no neighbour, a solid should be closed"):
         sections(Mesh(mesh.vertices, mesh.faces[1:]), np.array([5.0]))
+
+
+def test_sections_of_a_prism_are_the_same_vertex_by_vertex() -> None:
+    outline = m3.CrossSection.circle(10, 64) - m3.CrossSection.square((4, 6), True).rotate(20)
+    first, *others = sections(to_mesh(m3.Manifold.extrude(outline, 10)), np.linspace(0.3, 9.7, 20))
+    assert sum(len(ring) for ring in outline.to_polygons()) == len(shapely.get_coordinates(first)) - 2
+    assert all(first.equals_exact(other, 1e-9) for other in others)
