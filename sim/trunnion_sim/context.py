@@ -13,15 +13,20 @@ from trunnion_core.roles import Role
 
 from trunnion_sim import motion_kernel
 from trunnion_sim.chain import forward
+from trunnion_sim.collision.scene import Scene, make_scene
+from trunnion_sim.collision.sweep import Hits, sweep
 from trunnion_sim.limits import Limits
 from trunnion_sim.motion import Motion
 from trunnion_sim.notes import Notes, RowNotes
 from trunnion_sim.reader import FileEnd
 from trunnion_sim.replay import Replay, pieces, samples
 from trunnion_sim.rules import Rules
+from trunnion_sim.surface.deposit import Deposit, Pieces, lay_down
 
 TURN_STEP = math.radians(1.0)
 """rad that a rotary turns between two looks inside a row: 0.006 mm of arc height at 150 mm from the pivot."""
+CELLS_ACROSS = 4.0
+"""Cells of the height field across a bead where only contacts are looked for, not the surface."""
 GAP = 3
 """Rows between two offending rows that still belong to one finding."""
 MOST = 40
@@ -85,7 +90,7 @@ class Context:
 
     @cached_property
     def inside(self) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Rows (m,), tip (m, 3) and tool axis (m, 3) along the motion, so close that arcs drawn by rotaries are seen."""
+        """Rows (m,), tip (m, 3) and tool axis (m, 3) along the motion, so close that arcs of rotaries are seen."""
         rows, fractions = pieces(self.motion, self.profile, TURN_STEP)
         whole = fractions >= 1.0
         points, axes = self.points[rows], self.tool_axes[rows]
@@ -102,6 +107,78 @@ class Context:
         start, _ = forward(self.profile, self.motion.start[None])
         steps = np.linalg.norm(np.diff(points, axis=0, prepend=start), axis=1)
         return np.asarray(np.bincount(rows, weights=steps, minlength=len(self.motion)), dtype=np.float64)
+
+    @cached_property
+    def deposit(self) -> Deposit | None:
+        """The beads laid down over the part, and what every row met; None where nothing is laid."""
+        return self.lay_down(self.bead_width / CELLS_ACROSS)
+
+    @cached_property
+    def bead_width(self) -> float:
+        """mm, median of the widths that the comments name; without any, the nozzle's bore."""
+        named = self.rows.width[self.feeds]
+        named = named[np.isfinite(named) & (named > 0)]
+        return float(np.median(named)) if len(named) else self.profile.nozzle_diameter
+
+    @cached_property
+    def layer_height(self) -> float:
+        """mm, median of the heights that the comments name; without any, half the nozzle's bore."""
+        named = self.rows.height[self.feeds]
+        named = named[np.isfinite(named) & (named > 0)]
+        return float(np.median(named)) if len(named) else self.profile.nozzle_diameter / 2
+
+    def lay_down(self, cell: float, bounds: tuple[FloatArray, FloatArray] | None = None) -> Deposit | None:
+        """Lay every bead down on a height field with cells of `cell` mm over `bounds` (low and high, X and Y).
+
+        Without bounds the field covers every bead but the skirt. None where the program lays nothing.
+        """
+        present = ~self.homing & (self.homed | ~self.homing.any())
+        beads = self.feeds & present
+        if not beads.any():
+            return None
+        rows, points, axes = self.inside
+        start, _ = forward(self.profile, self.motion.start[None])
+        starts = np.concatenate([start, points[:-1]])
+        way = np.linalg.norm(points - starts, axis=1)
+        whole = self.tip_length[rows]
+        volume = np.where(self.feeds, self.motion.filament * self.profile.filament_area, 0.0)[rows]
+        share = np.divide(volume * way, whole, out=np.zeros(len(rows)), where=whole > 0)
+        if bounds is None:
+            core = beads & (self.rows.role != Role.SKIRT)
+            over = points[(core if core.any() else beads)[rows]][:, :2]
+            bounds = over.min(axis=0) - 2.0, over.max(axis=0) + 2.0
+        motions = Pieces(rows, starts, points, axes, share, present[rows])
+        return lay_down(motions, len(self.motion), *bounds, cell, self.profile.nozzle_flat_diameter)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The machine's bodies, its bed and clamps, for collision."""
+        return make_scene(self.profile)
+
+    @cached_property
+    def hits(self) -> Hits:
+        """Where bodies enter what stands on the bed; homing is the machine's own business."""
+        n = len(self.motion)
+        known = self.rows.height
+        height = np.where(np.isfinite(known) & (known > 0), known, self.profile.nozzle_diameter / 2)
+        area = np.divide(
+            self.motion.filament * self.profile.filament_area,
+            self.tip_length,
+            out=np.zeros(n),
+            where=self.feeds & (self.tip_length > 0),
+        )
+        # a stadium of that area: rectangle and two half-discs
+        width = np.where(area > 0, area / height + (1 - math.pi / 4) * height, 0.0)
+        start_tip, start_axis = forward(self.profile, self.motion.start[None])
+        return sweep(
+            self.scene,
+            np.vstack([self.motion.start, self.motion.joints]),
+            np.vstack([start_tip, self.points]),
+            np.vstack([start_axis, self.tool_axes]),
+            np.append(0.0, width),
+            np.append(0.0, height),
+            np.append(False, ~self.homing),
+        ).without_start()
 
     def find(
         self,

@@ -1,5 +1,6 @@
 """A program and a machine become a report: read, execute, replay, check, and compare the surface with the model."""
 
+import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -19,10 +20,15 @@ from trunnion_sim.notes import Notes, row_notes
 from trunnion_sim.reader import Block, Reader
 from trunnion_sim.registry import run_checks
 from trunnion_sim.replay import replay
-from trunnion_sim.report import JointUse, Report
+from trunnion_sim.report import JointUse, Report, SurfaceReport
 from trunnion_sim.rules import find_rules
+from trunnion_sim.surface.compare import compare
 
 SEVERITIES = ("error", "warning", "note")
+CELLS_ACROSS = 12.0
+"""Cells of the height field across a bead for comparison with the model."""
+MARGIN = 2.0
+"""mm of field around the model."""
 
 
 def judge(
@@ -37,7 +43,8 @@ def judge(
     """
     context = context_of(program, profile)
     findings = sorted(run_checks(context), key=lambda found: (SEVERITIES.index(found.severity), found.line or 0))
-    return _report(context, tuple(findings))
+    surface = None if model is None else surface_of(context, model, max_angle_deg)
+    return _report(context, tuple(findings), surface)
 
 
 def context_of(program: Path, profile: MachineProfile) -> Context:
@@ -66,6 +73,23 @@ def context_of(program: Path, profile: MachineProfile) -> Context:
         oddities=oddities.result(),
         end=reader.end,
     )
+
+
+def surface_of(
+    context: Context, model: Mesh, max_angle_deg: float | None = None, cell: float | None = None
+) -> SurfaceReport | None:
+    """What the beads leave behind, compared with the model; see `surface.compare`.
+
+    The height field has CELLS_ACROSS cells across a bead, or cells of `cell` mm. None where nothing is laid, or where
+    no visible facet is flat enough.
+    """
+    height, width = context.layer_height, context.bead_width
+    low, high = model.bounds[:, :2]
+    deposit = context.lay_down(cell or width / CELLS_ACROSS, (low - MARGIN, high + MARGIN))
+    if deposit is None:
+        return None
+    angle = math.degrees(math.atan2(height, width)) if max_angle_deg is None else max_angle_deg
+    return compare(deposit.field, model, angle, height)
 
 
 class _Oddities:
@@ -109,7 +133,7 @@ class _Oddities:
         )
 
 
-def _report(context: Context, findings: tuple[Finding, ...]) -> Report:
+def _report(context: Context, findings: tuple[Finding, ...], surface: SurfaceReport | None) -> Report:
     motion, replayed, profile = context.motion, context.replay, context.profile
     volume = motion.filament * profile.filament_area
     trace = Trace(motion.line, motion.joints, context.points, context.tool_axes, volume, replayed.end)
@@ -127,7 +151,8 @@ def _report(context: Context, findings: tuple[Finding, ...]) -> Report:
             "p50": _percentile(flow[moving], replayed.duration[moving], 50) or 0.0,
             "max": float(flow[moving].max(initial=0.0)),
         },
-        surface=None,
+        surface=surface,
+        clearance=context.hits.clearance if math.isfinite(context.hits.clearance) else None,
     )
 
 

@@ -67,6 +67,8 @@ class Motion:
     """(n,) bits of the joints that were homed when the row ran."""
     dwell: FloatArray
     """(n,) s of rest before the row; NaN where the machine only waits for its queue to empty; 0 if neither."""
+    bytes: IntArray
+    """(n,) of the line as it is sent, without number and checksum; 0 on further pieces of an arc."""
     commands: tuple[Command, ...]
     """Every non-motion command worth keeping, in order."""
     code_first_line: dict[tuple[str, int], int]
@@ -114,7 +116,7 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
             out = kernel.fresh_rows(room, k)
             at, made = kernel.execute(
                 at, block.letter, block.code, block.flags, block.word_start, block.word_letter, block.word_value,
-                block.line, letters, rotary, home, rules.g90_resets_e, rules.case_sensitive, state, out,
+                block.line, block.length, letters, rotary, home, rules.g90_resets_e, rules.case_sensitive, state, out,
                 row_of_command, problem, rows,
             )  # fmt: skip
             parts.append(kernel.joined([out], made))
@@ -136,6 +138,7 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
         relative=(joined.flags & kernel.RELATIVE) > 0,
         homed=joined.homed,
         dwell=joined.dwell,
+        bytes=joined.bytes,
         commands=tuple(commands),
         code_first_line=first_line,
         code_count=count,

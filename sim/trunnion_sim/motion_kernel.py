@@ -53,6 +53,7 @@ class Rows(NamedTuple):
     flags: NDArray[np.uint8]
     homed: NDArray[np.int64]
     dwell: NDArray[np.float64]
+    bytes: NDArray[np.int64]
 
 
 def fresh_rows(n: int, k: int) -> Rows:
@@ -66,6 +67,7 @@ def fresh_rows(n: int, k: int) -> Rows:
         np.zeros(n, np.uint8),
         np.zeros(n, np.int64),
         np.zeros(n),
+        np.zeros(n, np.int64),
     )
 
 
@@ -80,6 +82,7 @@ def joined(parts: Sequence[Rows], each: int | None = None) -> Rows:
         np.concatenate([part.flags[:each] for part in parts]),
         np.concatenate([part.homed[:each] for part in parts]),
         np.concatenate([part.dwell[:each] for part in parts]),
+        np.concatenate([part.bytes[:each] for part in parts]),
     )
 
 
@@ -93,6 +96,7 @@ def execute(
     word_letter: NDArray[np.uint8],
     word_value: NDArray[np.float64],
     source: NDArray[np.int64],
+    length: NDArray[np.int64],
     letters: NDArray[np.int64],
     rotary: NDArray[np.bool_],
     home: NDArray[np.float64],
@@ -106,7 +110,7 @@ def execute(
 ) -> tuple[int, int]:
     """Execute commands from `at` until the rows are full; returns the next command and the rows made."""
     k = len(letters)
-    line, kind, joints, filament, feed, row_flags, homed, dwell = out
+    line, kind, joints, filament, feed, row_flags, homed, dwell, size = out
     room = len(line)
     q = state[_FIRST : _FIRST + k]
     offset = state[_FIRST + k : _FIRST + 2 * k]
@@ -189,6 +193,7 @@ def execute(
             kind[made] = HOME
             joints[made] = q
             homed[made] = bits
+            size[made] = length[i]
             dwell[made] = np.nan if state[_DWELL] == 0 else state[_DWELL]
             state[_DWELL] = np.nan
             made += 1
@@ -253,6 +258,7 @@ def execute(
                 homed[made] = int(state[_HOMED])
                 dwell[made] = state[_DWELL]
                 state[_DWELL] = 0
+                size[made] = length[i] if p == 1 else 0
                 made += 1
             q[:] = target
     return len(letter), made

@@ -178,7 +178,7 @@ def _command(
             letter = ch
             if ch == 71 or ch == 77 or ch == 84:
                 code = -1 if state != 0 or not 0 <= value < 1e5 else int(np.floor(value * 10 + 0.5))
-                if ch == 77 and np.any(_TEXT_CODES == code):
+                if ch == 77 and np.any(code == _TEXT_CODES):
                     return letter, code, flag, w
                 continue
             flag |= NO_COMMAND

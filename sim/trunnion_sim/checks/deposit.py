@@ -1,0 +1,91 @@
+"""Beads lie on something and in a place of their own, and travels go around what is printed."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.findings import Finding
+
+from trunnion_sim.context import Context
+
+CODES = {
+    "bead-in-air": ("error", "A whole bead has nothing below it and nothing beside it."),
+    "long-bridge": ("warning", "A long stretch of a bead hangs in the air."),
+    "bead-over-bead": ("error", "A bead is laid where there is a bead already."),
+    "crowded-bead": ("warning", "A bead has less than half the room that its plastic needs."),
+    "travel-through-print": ("error", "The tip travels through what is printed."),
+}
+
+SHORTEST = 2.0
+"""mm of bead that is worth a finding."""
+BRIDGE = 20.0
+"""mm that ordinary filament bridges with ease."""
+LONGEST_DOUBLE = 5.0
+"""mm: seams and corners overlap themselves for shorter stretches."""
+OVER, CROWDED = 0.8, 0.5
+"""Share of a bead's plastic that found other plastic in its place."""
+DIP = 0.4
+"""Of a layer height: how far a travel may dip into the round top of a bead that stands a little proud."""
+
+
+def check(context: Context) -> Iterator[Finding]:
+    """Read what the deposit noted on every row."""
+    deposit = context.deposit
+    if deposit is None:
+        return
+    bead: IntArray = np.cumsum(~context.feeds, dtype=np.int64)
+    laid = _sum(bead, deposit.laid)
+    hanging = _sum(bead, deposit.unsupported)
+    whole = (hanging > 0.95 * laid) & (laid > SHORTEST)
+    in_air = whole[bead] & context.feeds & (deposit.laid > 0)
+    yield from context.find(
+        "bead-in-air",
+        "error",
+        in_air,
+        lambda row: f"a bead of {laid[bead[row]]:.3g} mm has nothing below it ({deposit.gap[row]:.2f} mm) or beside it",
+        value=np.nan_to_num(deposit.gap),
+        limit=context.layer_height,
+    )
+    loose = (deposit.unsupported > 0.9 * deposit.laid) & (deposit.laid > 0) & context.feeds
+    span = _run_length(loose, deposit.laid)
+    yield from context.find(
+        "long-bridge",
+        "warning",
+        loose & (span > BRIDGE) & ~in_air,
+        lambda row: f"{span[row]:.3g} mm of bead hang in the air",
+        value=span,
+        limit=BRIDGE,
+    )
+    volume = context.motion.filament * context.profile.filament_area
+    share = np.divide(deposit.crowded, volume, out=np.zeros(len(volume)), where=context.feeds & (deposit.laid > 0))
+    double = _run_length(share > OVER, deposit.laid) > LONGEST_DOUBLE
+
+    def message(row: int) -> str:
+        return f"{min(share[row], 1):.0%} of the bead's plastic finds other plastic in its place"
+
+    yield from context.find("bead-over-bead", "error", double, message, value=share, limit=OVER)
+    crowded = (_run_length(share > CROWDED, deposit.laid) > SHORTEST) & ~double
+    yield from context.find("crowded-bead", "warning", crowded, message, value=share, limit=CROWDED)
+    deep = deposit.depth > DIP * context.layer_height
+    yield from context.find(
+        "travel-through-print",
+        "error",
+        deep,
+        lambda row: (
+            f"a travel dips {deposit.depth[row]:.3f} mm into what is printed at X{{:.2f}} Y{{:.2f}} Z{{:.2f}}".format(
+                *deposit.depth_point[row]
+            )
+        ),
+        value=deposit.depth,
+        limit=DIP * context.layer_height,
+    )
+
+
+def _sum(group: IntArray, values: FloatArray) -> FloatArray:
+    return np.asarray(np.bincount(group, weights=values), dtype=np.float64)
+
+
+def _run_length(mask: BoolArray, length: FloatArray) -> FloatArray:
+    """(n,) summed `length` of the run of true rows that each true row belongs to; 0 elsewhere."""
+    run: IntArray = np.cumsum(np.diff(mask, prepend=False), dtype=np.int64)
+    return np.where(mask, _sum(run, length)[run] if len(run) else 0.0, 0.0)

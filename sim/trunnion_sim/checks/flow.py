@@ -1,0 +1,55 @@
+"""The plastic fits the bead that was planned, and the hot end can melt it."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from trunnion_core.bead import bead_area
+from trunnion_core.findings import Finding
+
+from trunnion_sim.context import Context
+
+CODES = {
+    "flow-off": ("warning", "Plastic per way differs from the planned bead's section by more than 15 %."),
+    "flow-wrong": ("error", "Plastic per way differs from the planned bead's section by a factor of 1.5 or more."),
+    "flow-too-high": ("warning", "More plastic per second than the hot end is rated to melt."),
+}
+
+OFF = 0.15
+WRONG = 1.5
+RATE_SLACK = 0.02
+"""Relative, for rounding."""
+LEAST = 0.05
+"""mm of tip travel under which the rounding of E says more than the bead."""
+
+
+def check(context: Context) -> Iterator[Finding]:
+    """Section from filament over tip travel against the comments' width and height; volume over time."""
+    volume = context.motion.filament * context.profile.filament_area
+    rows = context.feeds & (context.tip_length > LEAST)
+    section = np.divide(volume, context.tip_length, out=np.zeros(len(volume)), where=rows)
+    width, height = context.rows.width, context.rows.height
+    named = rows & np.isfinite(width) & np.isfinite(height) & (width > 0) & (height > 0) & context.rows.bead
+    planned = np.where(named, bead_area(np.where(named, width, 1.0), np.where(named, height, 1.0)), 1.0)
+    ratio = np.where(named, section / planned, 1.0)
+    wrong = (ratio > WRONG) | (ratio < 1 / WRONG)
+    off = (np.abs(ratio - 1) > OFF) & ~wrong
+
+    def message(row: int) -> str:
+        return (
+            f"a bead of {section[row]:.4f} mm² is laid where {width[row]:g} x {height[row]:g} mm "
+            f"({planned[row]:.4f} mm²) was planned"
+        )
+
+    yield from context.find("flow-wrong", "error", wrong, message, value=section, limit=planned)
+    yield from context.find("flow-off", "warning", off, message, value=section, limit=planned)
+    per_length = np.divide(volume, context.replay.length, out=np.zeros(len(volume)), where=context.replay.length > 0)
+    rate = np.where(rows, per_length * context.replay.cruise, 0.0)
+    most = context.profile.extruder.max_flow
+    yield from context.find(
+        "flow-too-high",
+        "warning",
+        rate > most * (1 + RATE_SLACK),
+        lambda row: f"{rate[row]:.3g} mm³/s, the hot end melts {most:g}",
+        value=rate,
+        limit=most,
+    )
