@@ -140,7 +140,7 @@ def _said(work: _Assembly, row: int, way: Hop, travels: bool) -> list[Finding]:
                 "turn-near-part",
                 "warning",
                 f"row {row} of layer {layer}: the machine turns on its way here and its limits leave no room to do "
-                "so clear of the part",
+                "so clear of part and bed",
                 row=row,
                 layer=layer,
                 point=(x, y, z),
