@@ -14,6 +14,7 @@ from shapely.geometry import MultiPolygon
 from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.bead import bead_spacing, bead_width
 from trunnion_core.errors import MeshError, PlacementError
+from trunnion_core.findings import Finding
 from trunnion_core.layers import Bead, Layer
 from trunnion_core.mesh import Mesh
 from trunnion_core.roles import Role
@@ -22,6 +23,7 @@ from trunnion_core.tolerance import WELD_DISTANCE
 
 from trunnion_slicer.beads import flat_bead
 from trunnion_slicer.infill import fill, require
+from trunnion_slicer.remarks import lost, unsupported
 from trunnion_slicer.sections import sections
 from trunnion_slicer.skirt import skirt
 from trunnion_slicer.thin import bare, gaps, middle_lines
@@ -43,7 +45,20 @@ NARROW_FILL = 0.6
 """Spacings. Where the lines of a zig-zag would be shorter than this, one bead along the middle does better."""
 
 
+@dataclass(frozen=True, eq=False)
+class PlanarPlan:
+    """Planar layers from the bed up, and what is worth saying about them."""
+
+    layers: tuple[Layer, ...]
+    findings: tuple[Finding, ...]
+
+
 def planar_layers(mesh: Mesh, settings: PrintSettings) -> list[Layer]:
+    """The layers of `plan_planar`."""
+    return list(plan_planar(mesh, settings).layers)
+
+
+def plan_planar(mesh: Mesh, settings: PrintSettings) -> PlanarPlan:
     """Layers from the bed up, each bead's points on the layer's upper plane, the tool upright.
 
     The mesh is solid and stands on z = 0. The first layer carries the skirt. Layers without material inside the part
@@ -71,7 +86,7 @@ def planar_layers(mesh: Mesh, settings: PrintSettings) -> list[Layer]:
         inside = offset(lines[-1], -pass_.spacing / 2) if lines else section
         beads += _inside(inside, solid[index], top[index], pass_)
         layers.append(Layer("planar", z, height, tuple(beads)))
-    return layers
+    return PlanarPlan(tuple(layers), lost(slices, layers) + unsupported(layers))
 
 
 @dataclass(frozen=True)

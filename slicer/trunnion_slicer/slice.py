@@ -5,15 +5,14 @@ from dataclasses import dataclass
 from time import perf_counter
 
 from trunnion_core.findings import Finding
-from trunnion_core.layers import Layer, LayerStack
+from trunnion_core.layers import LayerStack
 from trunnion_core.mesh import Mesh
 from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
 
 from trunnion_slicer.assemble import to_toolpath
 from trunnion_slicer.nonplanar.plan import plan_nonplanar
-from trunnion_slicer.planar import planar_layers
-from trunnion_slicer.support import unsupported
+from trunnion_slicer.planar import plan_planar
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +37,10 @@ def slice_mesh(mesh: Mesh, settings: PrintSettings) -> SliceResult:
     clock = _Clock()
     plan = plan_nonplanar(mesh, settings)
     clock.lap("nonplanar")
-    planar: list[Layer] = planar_layers(mesh if plan is None else plan.planar_mesh, settings)
+    planar = plan_planar(mesh if plan is None else plan.planar_mesh, settings)
     clock.lap("planar")
-    findings = unsupported(planar) + (() if plan is None else plan.findings)
-    stack = LayerStack((*planar, *(() if plan is None else plan.layers)))
-    clock.lap("findings")
+    stack = LayerStack(planar.layers + (() if plan is None else plan.layers))
+    findings = planar.findings + (() if plan is None else plan.findings)
     toolpath = to_toolpath(stack, settings)
     clock.lap("toolpath")
     return SliceResult(stack, toolpath, findings, clock.laps)

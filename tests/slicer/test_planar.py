@@ -11,7 +11,7 @@ from trunnion_core.layers import Bead, Layer
 from trunnion_core.mesh import Mesh
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
-from trunnion_slicer.planar import planar_layers
+from trunnion_slicer.planar import plan_planar, planar_layers
 from trunnion_slicer.sections import sections
 
 DENSE = PrintSettings(layer_height=0.3, fill_density=100, skirts=0)
@@ -160,3 +160,20 @@ def test_an_unknown_pattern_is_refused_even_where_no_layer_needs_it() -> None:
     settings = DENSE.model_copy(update={"fill_pattern": "gyroyd"})
     with pytest.raises(SettingsError, match="fill_pattern: 'gyroyd' is unknown"):
         planar_layers(SHAPES["box"], settings)
+
+
+def test_islands_in_the_air_are_said() -> None:
+    mushroom = m3.Manifold.cube((10, 10, 6)) + m3.Manifold.cube((4, 10, 3)).translate((20, 0, 3))
+    bridge = mushroom + m3.Manifold.cube((24, 10, 1)).translate((0, 0, 6))
+    findings = plan_planar(to_mesh(bridge), DENSE).findings
+    assert [(finding.code, finding.layer) for finding in findings] == [("unsupported-island", 10)]
+    assert findings[0].point == pytest.approx((22, 5, 3.3), abs=1)
+
+
+def test_what_no_bead_fits_into_is_said() -> None:
+    needle = m3.Manifold.cube((10, 10, 3)) + m3.Manifold.cylinder(9, 0.1, 0.1, 12).translate((5, 5, 0))
+    (finding,) = plan_planar(to_mesh(needle), DENSE).findings
+    assert finding.code == "thin-place-lost"
+    assert finding.layer == 10
+    assert finding.value == 20
+    assert plan_planar(SHAPES["plate with holes"], DENSE).findings == ()

@@ -1,10 +1,10 @@
-"""Plane layers become findings about islands that begin in the air."""
+"""Plane layers become findings: islands that begin in the air, islands that no bead fits into."""
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString, MultiPolygon, Polygon
 from trunnion_core.findings import Finding
 from trunnion_core.layers import Layer
 from trunnion_core.roles import Role
@@ -18,6 +18,38 @@ def unsupported(layers: Sequence[Layer]) -> tuple[Finding, ...]:
     Islands are known by their outer walls, so without perimeters there is nothing to say.
     """
     return tuple(_warnings(layers))
+
+
+def lost(slices: Sequence[MultiPolygon], layers: Sequence[Layer]) -> tuple[Finding, ...]:
+    """One warning for all islands of the sections in which no bead lies: too thin to be printed, they are missing."""
+    bare = [(layer, island) for section, layer in zip(slices, layers, strict=True) for island in _bare(section, layer)]
+    if not bare:
+        return ()
+    layer, island = bare[0]
+    place = island.representative_point()
+    return (
+        Finding(
+            "thin-place-lost",
+            "warning",
+            f"{len(bare)} islands on {len({id(layer) for layer, _ in bare})} layers are too thin for a bead and are "
+            f"left out, the first around ({place.x:.2f}, {place.y:.2f}) mm at z = {layer.z:.2f} mm",
+            layer=next(index for index, other in enumerate(layers) if other is layer),
+            value=float(len(bare)),
+            point=(float(place.x), float(place.y), layer.z),
+        ),
+    )
+
+
+def _bare(section: MultiPolygon, layer: Layer) -> Sequence[Polygon]:
+    """Islands that no bead touches."""
+    islands = np.array(section.geoms, dtype=object)
+    if not len(islands):
+        return []
+    lines = [LineString(bead.points[:, :2]) for bead in layer.beads]
+    filled = np.zeros(len(islands), np.bool_)
+    if lines:
+        filled[shapely.STRtree(lines).query(islands, predicate="intersects")[0]] = True
+    return [island for island in islands[~filled] if isinstance(island, Polygon)]
 
 
 def _warnings(layers: Sequence[Layer]) -> Iterator[Finding]:
