@@ -207,18 +207,47 @@ def test_a_roof_inside_a_large_triangle_is_seen() -> None:
     )
 
 
+def test_paths_do_not_run_over_a_cliff_inside_a_patch() -> None:
+    """A groove whose sloping floor runs out into the skin: one patch, with cliffs of no width on both sides."""
+
+    solid = manifold3d.Manifold.cube([24, 20, 30]).translate([-12, -10, 0])
+    slope = np.tan(np.radians(30.0))
+    wedge = solid.trim_by_plane([slope, 0.0, -1.0], -10.0 / np.hypot(slope, 1.0))
+    floor = solid.trim_by_plane([-0.1, 0.0, 1.0], 6.0 / np.hypot(0.1, 1.0))
+    groove = floor ^ manifold3d.Manifold.cube([40, 4, 60]).translate([-20, -2, 0])
+    mesh = of_manifold(wedge - groove)
+    plan = plan_nonplanar(mesh, PrintSettings(**BASE))
+    assert plan is not None
+    for bead in plan.layers[-1].beads:
+        step = np.diff(bead.points, axis=0)
+        rise = np.abs(step[:, 2]) / np.linalg.norm(step[:, :2], axis=1)
+        assert rise.max() < slope + 0.05
+
+
+def test_the_flat_floor_of_a_groove_stays_planar_and_a_flat_apex_does_not() -> None:
+    dome = over_box(lambda x, y: 9 - 15 + np.sqrt(15.0**2 - x**2 - y**2), 16, 48)
+    solid = manifold3d.Manifold(manifold3d.Mesh64(np.array(dome.vertices), dome.faces.astype(np.uint64)))
+    mesh = of_manifold(solid - manifold3d.Manifold.cube([30, 3, 10]).translate([-15, 2, 8.0]))
+    plan = plan_nonplanar(mesh, PrintSettings(**BASE))
+    assert plan is not None
+    middle = mesh.triangles[plan.region].mean(axis=1)
+    assert not ((middle[:, 1] > 2.1) & (middle[:, 1] < 4.9) & (np.abs(middle[:, 2] - 8) < 0.01)).any()
+    assert (np.linalg.norm(middle[:, :2], axis=1) < 1.0).any()
+
+
 def test_skin_over_too_little_material_stays_planar() -> None:
     plate = over_box(lambda x, y: 1.0 + x * np.tan(np.radians(2.5)) / 2, 20, 4)
     assert plan_nonplanar(plate, PrintSettings(**BASE, nonplanar_layers=3)) is None
 
 
 def test_folding_offsets_are_refused_and_said() -> None:
-    roof = over_box(lambda x, y: 8 - np.abs(x) * np.tan(np.radians(25.0)), 16, 64)
-    plan = plan_nonplanar(roof, PrintSettings(**BASE, nonplanar_layers=3))
+    """A dome of radius 2 mm shrinks to nothing after 6 layers of 0.3 mm."""
+    dome = over_box(lambda x, y: 6 + np.sqrt(2.0**2 - x**2 - y**2), 2.4, 24)
+    plan = plan_nonplanar(dome, PrintSettings(**BASE, nonplanar_layers=9))
     assert plan is not None
-    assert len(plan.layers) == 1
+    assert 4 <= len(plan.layers) <= 6
     (finding,) = plan.findings
-    assert (finding.code, finding.value, finding.limit) == ("nonplanar-offset-folds", 1.0, 3.0)
+    assert (finding.code, finding.value, finding.limit) == ("nonplanar-offset-folds", len(plan.layers), 9.0)
 
 
 def test_at_a_ridge_facets_keep_their_own_normal_and_the_tool_turns_over_a_bead() -> None:

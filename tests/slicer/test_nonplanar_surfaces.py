@@ -92,10 +92,17 @@ def test_densities_share_out_exactly_the_volume_between_the_surfaces() -> None:
     assert integral == pytest.approx(prism_volumes(triangles, stack.surfaces[1][faces]).sum(), rel=1e-12)
 
 
-def test_a_stack_ends_before_the_offset_that_folds() -> None:
-    # Ridge tiles of 0.25 mm move by 0.3 sin(25 deg) = 0.127 mm a layer towards the ridge: the second passes it.
-    assert offset_surfaces(patch_of(ridge(0.25)), 3, 0.3).layers == 1
-    assert offset_surfaces(patch_of(ridge(2.5)), 3, 0.3).layers == 3
+@pytest.mark.parametrize("tile", [2.5, 0.25, 0.1])
+def test_layers_under_a_ridge_keep_their_thickness_however_fine_the_tiles(tile: float) -> None:
+    # Fine tiles would pass through the ridge: each layer moves them towards it by 0.3 sin(25 deg) = 0.127 mm.
+    patch = patch_of(ridge(tile))
+    stack = offset_surfaces(patch, 2, 0.3)
+    assert stack.layers == 2
+    inner = (np.abs(patch.vertices[:, :2]) < 2.5).all(axis=1)
+    moved = stack.surfaces[2][inner]
+    ideal = -np.abs(moved[:, 0]) * np.tan(np.radians(25)) - 0.6 / np.cos(np.radians(25))
+    assert np.abs(moved[:, 2] - ideal).max() < 0.1
+    assert np.abs(moved[:, 2] - ideal).mean() < 0.015
 
 
 def test_a_tight_dome_takes_as_many_layers_as_its_radius_holds() -> None:

@@ -2,25 +2,31 @@
 
 Surface k is the skin moved inwards by k layer heights. An offset folds over itself where the distance exceeds the
 radius of curvature, and at ridges with narrow triangles; seen from above such a triangle turns over. Small folds are
-relaxed into the mean of their surroundings; a surface that stays folded ends the stack.
+relaxed by moving their triangles as a whole; a surface that stays folded ends the stack.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
 from trunnion_core.arrays import BoolArray, FloatArray, freeze
 
 from trunnion_slicer.nonplanar.patch import Patch
 
-RELAXED_SHARE = 0.05
-"""Share of a patch's footprint that may be relaxed; more is no longer the offset that was asked for."""
+RELAXED_SHARE = 0.1
+"""Share of a patch's footprint that may fold before it is relaxed; more is no longer the offset that was asked for."""
 
-RELAXATIONS = 40
+RELAXATIONS = 60
 """Rounds of relaxing before a fold counts as one that stays."""
 
 LEAST_FOOTPRINT = 0.02
 """Share of its footprint on the skin below which a triangle of an offset counts as folded: it is about to be."""
+
+THIN_SHARE, THIN_AREA = 0.75, 0.01
+"""A relaxed surface is refused where its layers are thinner or thicker than nominal by more than the first on more
+than the second of the footprint."""
+
+CRUMB_SHARE = 1e-4
+"""Share of the footprint that may stay folded: slivers of a tessellation, narrower than any bead."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +64,14 @@ class Surfaces:
 
 def offset_surfaces(patch: Patch, layers: int, height: float) -> Surfaces:
     """As many of `layers` offsets by multiples of `height` mm as do not fold."""
-    footprint = footprints(patch.vertices[patch.faces])
     surfaces = [patch.vertices]
+    steps = patch.steps
     for depth in range(1, layers + 1):
-        surface = _unfolded(patch, patch.vertices + depth * height * patch.steps, footprint)
-        if surface is None:
+        unfolded = _unfolded(patch, steps, depth * height)
+        if unfolded is None:
             break
-        surfaces.append(surface)
+        steps = unfolded
+        surfaces.append(patch.vertices + depth * height * steps)
     return Surfaces(patch, np.stack(surfaces), layers)
 
 
@@ -90,32 +97,46 @@ def prism_volumes(top: FloatArray, bottom: FloatArray) -> FloatArray:
     return np.asarray((mean * drop).sum(axis=1))
 
 
-def _unfolded(patch: Patch, surface: FloatArray, footprint: FloatArray) -> FloatArray | None:
-    """The surface with small folds relaxed; None where folds are large or stay."""
+def _unfolded(patch: Patch, steps: FloatArray, depth: float) -> FloatArray | None:
+    """Steps (n, 3) whose offset by `depth` mm has no folds that matter; None where there are too many.
+
+    The three corners of a folded triangle are given their common mean step, lengthened to keep the thickness: a
+    triangle that moves as a whole does not fold.
+    """
     faces = patch.faces
-    folded = _folded(surface, patch, footprint)
+    footprint = footprints(patch.vertices[faces])
+    folded = _folded(patch, steps, depth, footprint)
     if not folded.any():
-        return surface
+        return steps
     if footprint[folded].sum() > RELAXED_SHARE * footprint.sum():
         return None
-    a = np.concatenate([faces, np.roll(faces, -1, axis=1)], axis=1).ravel()
-    b = np.concatenate([np.roll(faces, -1, axis=1), faces], axis=1).ravel()
-    count = len(surface)
-    neighbours = coo_array((np.ones(len(a)), (a, b)), shape=(count, count)).tocsr()
-    valence = np.maximum(neighbours.sum(axis=1), 1.0)[:, None]
-    fixed = np.zeros(count, np.bool_)
-    fixed[patch.border.ravel()] = True
-    moved = np.zeros(count, np.bool_)
+    count = len(steps)
     for _ in range(RELAXATIONS):
-        moved[faces[folded].ravel()] = True
-        moved &= ~fixed
-        surface = np.where(moved[:, None], (neighbours @ surface) / valence, surface)
-        folded = _folded(surface, patch, footprint)
+        rows = faces[folded]
+        together = np.repeat(steps[rows].mean(axis=1), 3, axis=0)
+        share = np.bincount(rows.ravel(), minlength=count)
+        summed = [np.bincount(rows.ravel(), together[:, axis], count) for axis in range(3)]
+        moved = share > 0
+        relaxed = np.stack(summed, axis=1)[moved] / share[moved, None]
+        steps = steps.copy()
+        steps[moved] = relaxed / np.maximum(-(relaxed * patch.mean[moved]).sum(axis=1, keepdims=True), 0.5)
+        folded = _folded(patch, steps, depth, footprint)
         if not folded.any():
-            touched = moved[faces].any(axis=1)
-            return surface if footprint[touched].sum() <= 2 * RELAXED_SHARE * footprint.sum() else None
-    return None
+            break
+    if footprint[folded].sum() > CRUMB_SHARE * footprint.sum():
+        return None
+    return steps if _thickness_holds(patch, steps, footprint) else None
 
 
-def _folded(surface: FloatArray, patch: Patch, footprint: FloatArray) -> BoolArray:
-    return np.asarray(footprints(surface[patch.faces]) <= LEAST_FOOTPRINT * footprint)
+def _thickness_holds(patch: Patch, steps: FloatArray, footprint: FloatArray) -> bool:
+    top = patch.vertices[patch.faces]
+    normal = np.cross(top[:, 1] - top[:, 0], top[:, 2] - top[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    thickness = -(steps[patch.faces].mean(axis=1) * normal).sum(axis=1)
+    wrong = (thickness < THIN_SHARE) | (thickness > 1 / THIN_SHARE)
+    return bool(footprint[wrong].sum() <= THIN_AREA * footprint.sum())
+
+
+def _folded(patch: Patch, steps: FloatArray, depth: float, footprint: FloatArray) -> BoolArray:
+    moved = (patch.vertices + depth * steps)[patch.faces]
+    return np.asarray(footprints(moved) <= LEAST_FOOTPRINT * footprint)

@@ -19,6 +19,10 @@ from trunnion_slicer.nonplanar.normals import face_normals
 FLAT_DEG = 2.0
 """Degrees. A patch nowhere steeper than this has no stairs to speak of: its top layer is flat already."""
 
+FLAT_EDGE_DEG = 15.0
+"""Degrees. A flat place all of whose edges bend more than this is a top or a floor by itself (the bottom of a groove,
+a plateau); the flat apex of a dome goes over into it smoothly."""
+
 HYSTERESIS_DEG = 3.0
 """Degrees over the threshold that a face may have where two of its three neighbours are in: the border of a curved
 region would follow the teeth of the tessellation otherwise."""
@@ -51,7 +55,9 @@ def find_region(mesh: Mesh, twin: IntArray, settings: PrintSettings) -> BoolArra
         return none
     wide[rows[~_printable(mesh, rows, normal[rows, 2], settings)]] = False
     region = _smooth_border(wide & (slope <= settings.max_angle_deg + 1e-6), wide, twin)
-    return _drop_small_and_flat(mesh, region, twin, slope, area * normal[:, 2], settings)
+    footprint = area * normal[:, 2]
+    region = region & ~_plateaus(mesh, region & (slope < FLAT_DEG), twin, normal, footprint, settings)
+    return _drop_small_and_flat(mesh, region, twin, slope, footprint, settings)
 
 
 def components(region: BoolArray, twin: IntArray) -> tuple[int, IntArray]:
@@ -102,6 +108,32 @@ def _smooth_border(region: BoolArray, wide: BoolArray, twin: IntArray) -> BoolAr
         neighbours = (region[across] & known).sum(axis=1)
         region = region | (wide & (neighbours >= 2))
     return region
+
+
+def _plateaus(
+    mesh: Mesh,
+    flat: BoolArray,
+    twin: IntArray,
+    normal: FloatArray,
+    footprint: FloatArray,
+    settings: PrintSettings,
+) -> BoolArray:
+    """Of the flat faces, those of pieces with an edge all around; not of pieces below `nonplanar_min_area`."""
+    count, piece = components(flat, twin)
+    if not count:
+        return flat
+    half = (3 * np.flatnonzero(flat)[:, None] + np.arange(3)).ravel()
+    face, across = half // 3, np.where(twin[half] >= 0, twin[half], half) // 3
+    border = (across == face) | (piece[across] != piece[face])
+    half, face, across = half[border], face[border], across[border]
+    ends = mesh.triangles[face, half % 3], mesh.triangles[face, (half % 3 + 1) % 3]
+    length = np.linalg.norm(ends[1] - ends[0], axis=1)
+    bend = (normal[face] * normal[across]).sum(axis=1)
+    smooth = (bend > np.cos(np.radians(FLAT_EDGE_DEG))) & (across != face)
+    total = np.bincount(piece[face], length, count)
+    edged = np.bincount(piece[face], length * smooth, count) <= 0.02 * total
+    large = np.bincount(piece[flat], footprint[flat], count) >= settings.nonplanar_min_area
+    return flat & (edged & large)[piece]
 
 
 def _drop_small_and_flat(
