@@ -37,7 +37,10 @@ class Pace:
         """Seconds until something can happen by itself."""
         machine = self._machine
         if machine.speed is None:
-            return 0.0 if machine.working else min(max(self._busy_until - time.monotonic(), 0.001), LONGEST_SLEEP)
+            if machine.working:
+                return 0.0
+            left = self._busy_until - time.monotonic()
+            return left if left > 0 else LONGEST_SLEEP
         return min(max((machine.next_event - machine.now) / machine.speed, 0.0), LONGEST_SLEEP)
 
 

@@ -33,6 +33,8 @@ AMBIENT = 21.0
 BUSY_EVERY = 2.0
 IDLE_HEATING = 50.0
 """How much faster than the outside an idle machine as fast as possible heats up."""
+EVENTS_AT_ONCE = 10000
+"""Events after which a machine as fast as possible lets its caller look at the world again."""
 Handler = Callable[["SoftwareMachine", Command], Steps | None]
 CODES: dict[str, Handler] = {**motion_codes.CODES, **heat_codes.CODES, **host_codes.CODES}
 
@@ -124,7 +126,9 @@ class SoftwareMachine:
         if self._out or self.working or seconds <= 0:
             return self.take()
         if self.planner.moves and not self.halted:
-            while self.planner.moves and not self._out:
+            for _ in range(EVENTS_AT_ONCE):
+                if self._out or not self.planner.moves:
+                    break
                 self._step(self.next_event)
             return self.take()
         off_target = any(h.target and abs(h.target - h.reading) > h.model.hysteresis for h in self.heaters)
@@ -133,9 +137,9 @@ class SoftwareMachine:
     def work(self) -> None:
         """Jump from event to event while a command makes the host wait, until there is something to say."""
         self._settle()
-        while self.working and not self._out:
+        for _ in range(EVENTS_AT_ONCE):
             at = self.next_event
-            if at == math.inf:
+            if self._out or not self.working or at == math.inf:
                 break
             self._step(at)
 

@@ -9,6 +9,8 @@ from trunnion_sim.firmware.waits import Steps, Wait
 if TYPE_CHECKING:
     from trunnion_sim.firmware.machine import SoftwareMachine
 
+LONGEST_DWELL = 4294967.295
+"""s: what 32 bits of milliseconds hold."""
 HOMING_SPEED = 50.0
 """mm/s and degrees/s, or half of what the joint can where that is less."""
 
@@ -20,7 +22,7 @@ def dwell(machine: "SoftwareMachine", command: Command) -> Steps:
         seconds = command.value("S")
     yield from synchronize(machine)
     machine.say("//action:notification Sleep...\n")
-    yield Wait(until=machine.now + max(seconds, 0.0))
+    yield Wait(until=machine.now + min(max(seconds, 0.0), LONGEST_DWELL))
 
 
 def home(machine: "SoftwareMachine", command: Command) -> Steps:
