@@ -52,14 +52,11 @@ def read_3mf(path: Path, data: bytes) -> tuple[FloatArray, IntArray, list[Findin
         objects: dict[Key, _Object] = {}
         start = _start_part(package)
         items, unit = _read_part(path, package, start, objects)
-        waiting = {key[0] for key, _, _ in items} | _named_parts(objects)
-        while waiting - {key[0] for key in objects}:
-            part = min(waiting - {key[0] for key in objects})
-            count = len(objects)
+        read = {start}
+        while waiting := ({key[0] for key, _, _ in items} | _named_parts(objects)) - read:
+            part = min(waiting)
             _read_part(path, package, part, objects)
-            if len(objects) == count:
-                raise MeshError(f"{path}: model part '{part}' holds no objects, but is referred to")
-            waiting |= _named_parts(objects)
+            read.add(part)
     except (zipfile.BadZipFile, zlib.error, EOFError) as error:
         raise MeshError(f"{path}: is no readable 3MF package: {error}") from None
     except KeyError as error:
@@ -116,12 +113,14 @@ def _collect(
     if thing.kind not in ("model", "solidsupport", "other") or (thing.kind == "other" and depth == 0):
         return 1
     skipped = 0
+    linear = transform[:3]
     if thing.vertices is not None and thing.faces is not None and len(thing.faces):
-        linear = transform[:3]
         faces = thing.faces if np.linalg.det(linear) > 0 else thing.faces[:, ::-1]
-        bodies.append((thing.vertices @ linear + transform[3], faces))
+        with np.errstate(invalid="ignore"):  # what is not finite is found, and said, where the file is checked
+            bodies.append((thing.vertices @ linear + transform[3], faces))
     for child, placed in thing.components:
-        combined = placed @ np.column_stack([transform, [0.0, 0.0, 0.0, 1.0]])
+        combined = placed @ linear
+        combined[3] += transform[3]
         skipped += _collect(path, objects, child, combined, bodies, depth + 1)
     return skipped
 
