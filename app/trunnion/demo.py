@@ -1,6 +1,5 @@
 """The main job end to end on one sample part, with pictures, in one folder."""
 
-import html
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -12,17 +11,13 @@ from trunnion_core.validation import nearest
 from trunnion_slicer.mesh_io import write_stl
 
 from trunnion import samples
+from trunnion.commands.report import print_findings
 from trunnion.dry_run import check_program
+from trunnion.html_report import report_page
 from trunnion.output import whole_file
 from trunnion.pictures import draw_deviation, draw_joints, draw_toolpath
 from trunnion.pipeline import Timings, load_part, make_job, write_job
 from trunnion.printing import open_printer, print_program
-
-PICTURES = {
-    "toolpath.png": "The toolpath, coloured by role",
-    "deviation.png": "What the beads leave behind, against the model",
-    "joints.png": "The joints over time, as the software machine moved them",
-}
 
 
 def run_demo(part: str, machine: str, folder: Path, say: Callable[[str], None]) -> Path:
@@ -48,7 +43,7 @@ def run_demo(part: str, machine: str, folder: Path, say: Callable[[str], None]) 
         report = check_program(program, profile, model)
     say(f"printing {program} on the embedded machine")
     with timings.stage("print"), open_printer("sim", profile) as printer:
-        result = print_program(program, profile, printer)
+        result = print_program(program, printer)
     if result.reason:
         raise StreamError(f"{program}: stopped after {result.executed} lines: {result.reason}")
     say("drawing")
@@ -61,32 +56,11 @@ def run_demo(part: str, machine: str, folder: Path, say: Callable[[str], None]) 
     data = report.to_json()
     (folder / "check.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     page = folder / "index.html"
-    facts = {
-        "machine": profile.name,
-        "verdict of the dry run": report.verdict,
-        "findings": ", ".join(f"{code}: {count}" for code, count in data["counts"].items()) or "none",
-        "lines sent and executed": f"{result.executed}",
-        "print time": f"{data['time_s'] / 60:.1f} min",
-        "filament": f"{data['filament_mm']:.0f} mm",
-        "Chamfer distance": f"{data['surface']['chamfer_mm']:.4f} mm" if data.get("surface") else "not compared",
-        "time taken": ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in timings.seconds.items()),
-    }
     with whole_file(page) as path:
-        path.write_text(_page(part, facts), encoding="utf-8")
-    say(f"{report.verdict}: {summary.lines} lines, {data['time_s'] / 60:.1f} min, every line executed")
+        path.write_text(report_page(report, profile, f"{part} on {profile.name}"), encoding="utf-8")
+    print_findings(report.findings)
+    stages = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in timings.seconds.items())
+    say(f"took {stages}")
+    say(f"{report.verdict}: {result.executed} commands sent and executed, {data['time_s'] / 60:.1f} min on the machine")
     return page
 
-
-def _page(part: str, facts: dict[str, str]) -> str:
-    rows = "".join(f"<tr><th>{html.escape(key)}</th><td>{html.escape(value)}</td></tr>" for key, value in facts.items())
-    figures = "".join(
-        f'<figure><img src="{name}" alt="{text}"><figcaption>{text}</figcaption></figure>'
-        for name, text in PICTURES.items()
-    )
-    return (
-        '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        f"<title>Trunnion: {html.escape(part)}</title>"
-        "<style>body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}"
-        "img{max-width:100%}th{text-align:left;padding-right:1rem;vertical-align:top}figure{margin:2rem 0}</style>"
-        f"<h1>{html.escape(part)}</h1><table>{rows}</table>{figures}</html>\n"
-    )

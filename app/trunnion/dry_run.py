@@ -6,7 +6,8 @@ from pathlib import Path
 from trunnion_core.mesh import Mesh
 from trunnion_core.profile import MachineProfile
 from trunnion_core.settings import PrintSettings
-from trunnion_sim.judge import Report, judge
+from trunnion_sim.judge import judge
+from trunnion_sim.report import Report
 from trunnion_slicer.mesh_io import load_mesh
 from trunnion_slicer.placement import place
 from trunnion_slicer.repair import make_solid

@@ -13,7 +13,16 @@ from trunnion.commands.options import EXISTING_FILE, OUTPUT_FILE, machine_option
 @machine_option()
 @click.option("--model", type=EXISTING_FILE, help="The mesh; compares what the beads leave behind with it.")
 @click.option("--json", "json_file", type=OUTPUT_FILE, help="Write the report as JSON.")
-def command(program: Path, machine: str, model: Path | None, json_file: Path | None) -> None:
+@click.option("--junit", "junit_file", type=OUTPUT_FILE, help="Write JUnit XML: a test case a finding code.")
+@click.option("--html", "html_file", type=OUTPUT_FILE, help="Write one self-contained page: 3D, time slider, findings.")
+def command(
+    program: Path,
+    machine: str,
+    model: Path | None,
+    json_file: Path | None,
+    junit_file: Path | None,
+    html_file: Path | None,
+) -> None:
     """Run PROGRAM in the software machine and judge it. Exit status: 0 pass, 1 findings, 2 misuse."""
     from trunnion_core.profile import load_profile
 
@@ -30,6 +39,16 @@ def command(program: Path, machine: str, model: Path | None, json_file: Path | N
     if json_file is not None:
         with whole_file(json_file) as path:
             path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    if junit_file is not None:
+        from trunnion.junit import junit_xml
+
+        with whole_file(junit_file) as path:
+            path.write_text(junit_xml(report, program.name, profile.name), encoding="utf-8")
+    if html_file is not None:
+        from trunnion.html_report import report_page
+
+        with whole_file(html_file) as path:
+            path.write_text(report_page(report, profile, program.name), encoding="utf-8")
     print_findings(report.findings)
     surface = data.get("surface")
     if surface is not None:
