@@ -10,38 +10,11 @@ in it, so it also says how many oks went missing or came twice.
 from array import array
 from collections import deque
 from collections.abc import Sequence
-from enum import Enum, auto
 
 from trunnion_host.limits import Limits
 from trunnion_host.replies import Kind, Reply, parse, temperatures
+from trunnion_host.states import LEGAL, State
 from trunnion_host.wire import numbered
-
-
-class State(Enum):
-    """Where the stream is."""
-
-    GREETING = auto()
-    """Numbers are being agreed on; nothing of the program was sent."""
-    STREAMING = auto()
-    """Lines go out as the window allows."""
-    RESYNC = auto()
-    """A line is asked for again; waiting until the wire is quiet."""
-    STOPPING = auto()
-    """The program is abandoned; the farewell is being sent."""
-    DONE = auto()
-    """Every line was executed."""
-    STOPPED = auto()
-    """It ended earlier; `reason` says why."""
-
-
-LEGAL: dict[State, frozenset[State]] = {
-    State.GREETING: frozenset({State.STREAMING, State.STOPPED}),
-    State.STREAMING: frozenset({State.RESYNC, State.STOPPING, State.DONE, State.STOPPED}),
-    State.RESYNC: frozenset({State.STREAMING, State.STOPPING, State.STOPPED}),
-    State.STOPPING: frozenset({State.STOPPED}),
-    State.DONE: frozenset(),
-    State.STOPPED: frozenset(),
-}
 
 ASK = -1
 """In the log: an M105 that the host put between the program's lines."""
@@ -90,6 +63,7 @@ class Sender:
         self._answers_missing = False
         self._want_ask = False
         self._verified = 0
+        self._answered_plainly = 0
         self._unanswered_asks = 0
         self._again = (0, 0)
         self._doubted = (0, 0)
@@ -244,7 +218,7 @@ class Sender:
         """A question was answered without temperatures: by a firmware that has none, or the answer was damaged."""
         self._slow = False
         if not self.heaters and number == self._asks[0]:
-            self._verified = max(self._verified, self._asks.popleft())
+            self._answered_plainly = self._asks.popleft()
         elif number > self._asks[-1] + self.limits.window_lines:
             self._asks.clear()
             self._owed.clear()
@@ -285,8 +259,9 @@ class Sender:
         elif number > len(self._log):
             self._want_ask = True
         elif number == self._next_number:
-            if any(n >= number for n, _ in self._in_flight):
-                self._believe(number - 1)  # an answer to a question that overtook this line
+            if any(n >= number for n, _ in self._in_flight):  # the answer to a question that overtook this line
+                self._asks = deque(asked for asked in self._asks if asked < number)
+                self._believe(number - 1)
         elif number <= self._acked:
             self._doubt(number)
         else:
@@ -487,7 +462,7 @@ class Sender:
         """Over when the firmware is known to have taken the last number, not merely when enough oks came."""
         if self._last_needed < 0 or self._in_flight or self._next_number < len(self._log):
             return
-        if self._verified > self._last_needed:
+        if max(self._verified, self._answered_plainly) > self._last_needed:
             if self.state is State.STREAMING:
                 self._to(State.DONE)
             elif self.state is State.STOPPING:

@@ -11,7 +11,8 @@ from trunnion_core.errors import StreamError
 from trunnion_host.limits import Limits
 from trunnion_host.port import Port
 from trunnion_host.prepare import commands
-from trunnion_host.protocol import FAREWELL, Sender, State
+from trunnion_host.protocol import FAREWELL, Sender
+from trunnion_host.states import State
 
 REPORT_EVERY = 0.1
 """s between two calls of on_progress."""

@@ -2,7 +2,8 @@
 
 import pytest
 from trunnion_core.profile import load_profile
-from trunnion_host.protocol import HEATERS_OFF, Sender, State
+from trunnion_host.protocol import HEATERS_OFF, Sender
+from trunnion_host.states import State
 from trunnion_sim.firmware.faults import parse_fault
 from trunnion_sim.firmware.machine import SoftwareMachine
 
