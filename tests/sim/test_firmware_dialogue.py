@@ -169,6 +169,12 @@ def test_stop_command_prompts_until_a_person_answers(wire: Wire, way_out: str) -
     assert ("M876 Responding PROMPT_" in said) == way_out.startswith("M876")
 
 
+def test_stop_command_repeats_its_text_and_ends_by_itself_when_told_so(wire: Wire) -> None:
+    said = wire.ask("M0 P1500 Clip the part\n", 1.4)
+    assert said.startswith("echo:Clip the part\n//action:prompt_end\n//action:prompt_begin M0 Stop\n")
+    assert wire.ask("", 0.2) == "ok\n"
+
+
 def test_emergency_stop_does_not_queue(wire: Wire) -> None:
     wire.ask("G4 S60\nG4 S60\nM107\nM107\nM107\n")
     assert wire.ask("M112\n") == "echo:M112 Shutdown\nError:Printer halted. kill() called!\n//action:poweroff\n"

@@ -1,5 +1,6 @@
 """Commands by which host and firmware talk about the wire, the state and the person: M0, M110 to M118, M876."""
 
+import re
 from typing import TYPE_CHECKING
 
 from trunnion_sim.firmware import replies
@@ -11,14 +12,18 @@ if TYPE_CHECKING:
     from trunnion_sim.firmware.machine import SoftwareMachine
 
 
+TIMES = re.compile(r"^(?:[PS] *[\d.]+ *)+")
+"""The numbers of M0, before its text."""
+
+
 def pause(machine: "SoftwareMachine", command: Command) -> Steps:
     """M0, M1: wait for a person, or P milliseconds, or S seconds."""
     seconds = command.value("S") if "S" in command.words else command.value("P") / 1000.0
     yield from synchronize(machine)
-    text = command.rest if command.rest and not command.words else ""
+    text = TIMES.sub("", command.rest)
     if text:
         machine.say(f"echo:{text}\n")
-    machine.say(replies.prompt(text or f"{command.code} Stop", "Continue"))
+    machine.say(replies.prompt(f"{command.code} Stop", "Continue"))
     machine.waits_for_user = True
     machine.prompt_open = True
     until = machine.now + seconds if seconds > 0 else float("inf")
