@@ -12,6 +12,10 @@ from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.bead import bead_area
 from trunnion_core.toolpath import Toolpath
 
+MOST_CURVATURE = 0.1
+"""How much curvature may change a bead's length, as a share: a radius of five bead heights. What bends more is an edge,
+at which the tool turns within a row but no bead is shorter for it."""
+
 
 def filament_per_row(toolpath: Toolpath, filament_diameter: float, multiplier: float = 1.0) -> FloatArray:
     """(n,) mm of filament that every row of the toolpath feeds; 0 where nothing is extruded.
@@ -29,9 +33,12 @@ def bead_volume(toolpath: Toolpath) -> FloatArray:
     half = 0.5 * toolpath.height[1:, None]
     middle_end = toolpath.points[1:] - half * toolpath.tool_axes[1:]
     middle_start = toolpath.points[:-1] - half * toolpath.tool_axes[:-1]
+    tip = np.linalg.norm(np.diff(toolpath.points, axis=0), axis=1)
+    middle = np.linalg.norm(middle_end - middle_start, axis=1)
+    length = np.clip(middle, (1 - MOST_CURVATURE) * tip, (1 + MOST_CURVATURE) * tip)
     volume = np.zeros(len(toolpath))
     section = bead_area(toolpath.width[1:], np.maximum(toolpath.height[1:], np.finfo(float).tiny))
-    volume[1:] = section * np.linalg.norm(middle_end - middle_start, axis=1)
+    volume[1:] = section * length
     volume[~toolpath.extrudes] = 0.0
     return volume
 

@@ -1,14 +1,28 @@
-"""Say where a machine's axes hold the flow below what the hot end gives steadily, and what the hot end slows down."""
+"""Turn what a hot end can give into a window of tip speed, and say where a machine's axes hold the tip below it."""
 
 from collections.abc import Iterator
 
 import numpy as np
 from trunnion_core.arrays import FloatArray, IntArray
+from trunnion_core.bead import bead_area
 from trunnion_core.findings import Finding
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
 
 from trunnion_motion.timelaw import BY_WISH, TimeLaw
+
+
+def tip_window(
+    width: FloatArray, height: FloatArray, profile: MachineProfile, multiplier: float = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """(n,) least and (n,) greatest tip speed in mm/s at which beads keep the flow between the extruder's limits.
+
+    `width`, `height` (n,) mm; where the width is 0 nothing is extruded and the window is open.
+    """
+    beads = width > 0
+    area = np.where(beads, bead_area(width, np.where(beads, height, 1.0)) * multiplier, 1.0)
+    least = np.where(beads, profile.extruder.min_flow / area, 0.0)
+    return least, np.where(beads, profile.extruder.max_flow / area, np.inf)
 
 
 def flow_findings(

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from trunnion_core.arrays import FloatArray
-from trunnion_core.bead import bead_area
 from trunnion_core.errors import UnreachableError
 from trunnion_core.findings import Finding
 from trunnion_core.profile import MachineProfile
@@ -22,7 +21,7 @@ from trunnion_kinematics.chain import JointChain
 
 from trunnion_motion.events import events_for
 from trunnion_motion.flow import filament_per_row, share
-from trunnion_motion.flow_window import flow_findings
+from trunnion_motion.flow_window import flow_findings, tip_window
 from trunnion_motion.hop import Machine
 from trunnion_motion.path import assemble
 from trunnion_motion.retraction import with_retractions
@@ -68,7 +67,8 @@ def plan_motion(toolpath: Toolpath, profile: MachineProfile, settings: PrintSett
         feed = filament_per_row(toolpath, profile.filament_diameter, settings.extrusion_multiplier)
         rows = replace(rows, filament=share(feed, rows.points, rows.source))
         rows = with_retractions(rows, settings.retract_length)
-        rows = _within_melt_rate(rows, profile, settings)
+        _, fastest = tip_window(rows.width, rows.height, profile, settings.extrusion_multiplier)
+        rows = replace(rows, tip_speed=np.minimum(rows.tip_speed, fastest))
 
     tip_length = rows.tip_lengths(chain.forward(home[None])[0][0])
     law = _timed(rows, tip_length, profile, settings, home)
@@ -110,14 +110,6 @@ def _chosen(
         raise UnreachableError(
             error.row, error.point, error.tool_axis, error.joint, error.reason, layer=layer
         ) from None
-
-
-def _within_melt_rate(rows: Rows, profile: MachineProfile, settings: PrintSettings) -> Rows:
-    """Wanted tip speeds lowered to what the hot end can melt."""
-    beads = rows.width > 0
-    area = bead_area(rows.width, np.where(beads, rows.height, 1.0)) * settings.extrusion_multiplier
-    fastest = np.where(beads, profile.extruder.max_flow / np.where(beads, area, 1.0), np.inf)
-    return replace(rows, tip_speed=np.minimum(rows.tip_speed, fastest))
 
 
 def _timed(

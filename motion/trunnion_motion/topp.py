@@ -23,7 +23,8 @@ class PathLaw:
     path_speed: FloatArray
     """(n,) path units per s at the samples."""
     limit: FloatArray
-    """(n,) the largest path speed at each sample that speed limits and window allow, whatever happens elsewhere."""
+    """(n,) the largest path speed at each sample that joint speeds, joint accelerations and window allow there, however
+    slow it is elsewhere: where this is below what the flow needs, the axes starve the hot end."""
 
     @property
     def total(self) -> float:
@@ -153,6 +154,7 @@ def _passes(
         step = path[i + 1] - path[i]
         _bands(first, second, i, step, g, h)
         reach[i] = _largest_start(g, h, acceleration, step, ceiling[i], reach[i + 1])
+        ceiling[i] = _largest_start(g, h, acceleration, step, ceiling[i], np.inf)
 
     x = np.empty(n)
     x[0] = 0.0

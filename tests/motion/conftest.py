@@ -61,6 +61,9 @@ MACHINES = {
     "bc": bc_table,
     "bc_limited": lambda: bc_table(200),
     "head": head,
+    "open5x_prusa_i3": lambda: load_profile("open5x_prusa_i3"),
+    "open5x_voron0": lambda: load_profile("open5x_voron0"),
+    "rep5x_ender3": lambda: load_profile("rep5x_ender3"),
 }
 
 

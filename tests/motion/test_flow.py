@@ -91,3 +91,10 @@ def test_subdivision_shares_in_proportion_and_loses_nothing():
 
 def test_a_bead_without_length_is_nothing():
     assert bead_volume(line([[0, 0, 0.3], [0, 0, 0.3]], 0.4, 0.3)).sum() == 0
+
+
+def test_an_edge_at_which_the_tool_turns_makes_no_blob():
+    axes = np.array([[0.0, 0, 1], [0, 0, 1], [-0.5, 0, np.sqrt(0.75)], [-0.5, 0, np.sqrt(0.75)]])
+    points = [[0, 0, 0.3], [5, 0, 0.3], [5.1, 0, 0.3], [10, 0, 0.3]]
+    volume = bead_volume(line(points, 0.4, 0.3, axes))
+    assert volume[2] <= 1.1 * volume[1] * 0.1 / 5

@@ -88,3 +88,15 @@ def test_the_spline_is_scipys(n):
     first, second = spline_derivatives(path, joints)
     assert_allclose(first, CubicSpline(path, joints)(path, 1), atol=1e-9)
     assert_allclose(second, CubicSpline(path, joints)(path, 2), atol=1e-9)
+
+
+def test_the_limit_of_a_circle_is_its_centripetal_one():
+    radius = 10.0
+    path = np.linspace(0, 2 * np.pi * radius, 3001)
+    angle = path / radius
+    zero = np.zeros_like(angle)
+    joints = np.stack([radius * np.cos(angle), radius * np.sin(angle), zero, zero, zero], axis=1)
+    law = toppra_law(path, joints, SPEED, ACCELERATION)
+    along_x = np.argmin(np.abs(angle - np.pi))
+    assert_allclose(law.limit[along_x], np.sqrt(2000 * radius), rtol=1e-3)
+    assert (law.path_speed <= law.limit * (1 + 1e-9)).all()
