@@ -11,6 +11,9 @@ from trunnion_core.roles import Role
 
 from trunnion_slicer.order import islands_of
 
+SLIVER = 0.05
+"""mm. Islands that vanish when they shrink by this are what cutting two surfaces leaves behind, not part of a model."""
+
 
 def unsupported(layers: Sequence[Layer]) -> tuple[Finding, ...]:
     """A warning for every island of a layer that touches nothing of the layer below: it would be printed on air.
@@ -49,7 +52,9 @@ def _bare(section: MultiPolygon, layer: Layer) -> Sequence[Polygon]:
     filled = np.zeros(len(islands), np.bool_)
     if lines:
         filled[shapely.STRtree(lines).query(islands, predicate="intersects")[0]] = True
-    return [island for island in islands[~filled] if isinstance(island, Polygon)]
+    return [
+        island for island in islands[~filled] if isinstance(island, Polygon) and not island.buffer(-SLIVER).is_empty
+    ]
 
 
 def _warnings(layers: Sequence[Layer]) -> Iterator[Finding]:

@@ -79,6 +79,17 @@ def test_no_row_extrudes_in_place_and_no_travel_stands_still(toolpath: Toolpath)
     assert step.min() > 0
 
 
+def test_without_lift_there_are_no_rows_that_stand_still(towers: LayerStack) -> None:
+    path = to_toolpath(towers, PLAIN.model_copy(update={"retract_lift": 0.0}))
+    assert np.linalg.norm(np.diff(path.points, axis=0), axis=1).min() > 0
+
+
+def test_the_same_layers_give_the_same_toolpath(toolpath: Toolpath, towers: LayerStack) -> None:
+    again = to_toolpath(towers, PLAIN)
+    assert (again.points == toolpath.points).all()
+    assert (again.role == toolpath.role).all()
+
+
 def test_loops_close_exactly(toolpath: Toolpath) -> None:
     loops = 0
     for first, last in runs(toolpath):
