@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trunnion_core.arrays import FloatArray
+from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_core.roles import Role
 from trunnion_core.toolpath import Toolpath
@@ -31,6 +31,8 @@ ROLE_COLOURS = {
 VIEW_AZIMUTH = np.radians(-55.0)
 VIEW_ELEVATION = np.radians(35.0)
 PIXELS_PER_INCH = 130
+PIECE = 0.5
+"""mm of a bead that is drawn as one stroke: shorter than anything that hides it is wide."""
 DEVIATION_RANGE = 0.2
 """mm at the ends of the colour scale: two thirds of a coarse layer, so that stairs saturate and grooves show."""
 DEVIATION_CELL = 0.1
@@ -42,12 +44,13 @@ def draw_toolpath(toolpath: Toolpath, path: Path, title: str) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
-    rows = np.flatnonzero(toolpath.extrudes & (toolpath.role != Role.SKIRT))
-    screen, depth = _project(toolpath.points)
-    segments = np.stack([screen[rows - 1], screen[rows]], axis=1)
-    order = np.argsort(depth[rows] + depth[rows - 1], kind="stable")
+    rows, begin, end = _pieces(toolpath)
+    start, near = _project(begin)
+    stop, far = _project(end)
+    segments = np.stack([start, stop], axis=1)
+    order = np.argsort(near + far, kind="stable")
     roles = toolpath.role[rows]
-    colours = _role_colours(roles, toolpath.points[rows] - toolpath.points[rows - 1])
+    colours = _role_colours(roles, end - begin)
     figure, axes = _figure(9.0, 6.5)
     low, high = segments.min(axis=(0, 1)), segments.max(axis=(0, 1))
     axes.set_xlim(low[0] - 1, high[0] + 1)
@@ -109,6 +112,18 @@ def draw_joints(trace: Trace, profile: MachineProfile, path: Path, title: str) -
     _save(figure, path)
 
 
+def _pieces(toolpath: Toolpath) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Rows (m,) and both ends (m, 3) of every bead, cut so short that sorting by depth shows what hides what."""
+    rows = np.flatnonzero(toolpath.extrudes & (toolpath.role != Role.SKIRT))
+    begin, end = toolpath.points[rows - 1], toolpath.points[rows]
+    cuts = np.maximum(np.ceil(np.linalg.norm(end - begin, axis=1) / PIECE), 1).astype(np.int64)
+    which = np.repeat(np.arange(len(rows)), cuts)
+    number = np.arange(len(which)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
+    step = ((end - begin) / cuts[:, None])[which]
+    first = begin[which] + number[:, None] * step
+    return rows[which], first, first + step
+
+
 def _project(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Screen coordinates (n, 2) and depth (n,) growing towards the eye."""
     c, s = np.cos(VIEW_AZIMUTH), np.sin(VIEW_AZIMUTH)
@@ -119,7 +134,7 @@ def _project(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.stack([across, up], axis=1), depth
 
 
-def _role_colours(roles: "np.typing.NDArray[np.int64]", direction: FloatArray) -> FloatArray:
+def _role_colours(roles: IntArray, direction: FloatArray) -> FloatArray:
     """(n, 4) colours, darker the more a bead runs towards the eye, so that neighbouring directions can be told."""
     from matplotlib.colors import to_rgba
 

@@ -123,7 +123,7 @@ function beadColours(kind) {
 function solid(shape) { // triangles with normals in the shape's own frame
   const out = [], push = (p, n) => out.push(...p, ...n);
   const quad = (a, b, c, d) => {
-    const u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]], v = [d[0] - a[0], d[1] - a[1], d[2] - a[2]];
+    const u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]], v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
     const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     const l = Math.hypot(...n) || 1, m = n.map((x) => x / l);
     for (const p of [a, b, c, a, c, d]) push(p, m);
@@ -184,7 +184,7 @@ const cloud = gl && deviation && { points: buffer(deviation.points), colour: buf
 const marks = facts.findings.filter((f) => f.point);
 const markBuffer = gl && buffer(Float32Array.from(marks.flatMap((f) => f.point)));
 
-const camera = { azimuth: -0.9, elevation: 0.6, distance: facts.size * 2.6, target: [...facts.middle] };
+const camera = { azimuth: -0.9, elevation: 0.6, distance: facts.size * 1.7, target: [...facts.middle] };
 function clipMatrix(machineFromPart) {
   const { azimuth, elevation, distance, target } = camera;
   const centre = byId("frame").value === "machine" ? apply(machineFromPart, target, 1) : target;
@@ -198,6 +198,7 @@ function clipMatrix(machineFromPart) {
   const lens = [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, 2 * far * near / (near - far), 0];
   return multiply(lens, look);
 }
+const ground = getComputedStyle(document.body).backgroundColor.match(/[\d.]+/g).slice(0, 3).map((c) => c / 255);
 let now = duration, picked = null;
 function draw() {
   drawPlots();
@@ -207,7 +208,7 @@ function draw() {
   const box = canvas.getBoundingClientRect(), ratio = devicePixelRatio || 1;
   canvas.width = Math.max(1, box.width * ratio); canvas.height = Math.max(1, box.height * ratio);
   gl.viewport(0, 0, canvas.width, canvas.height);
-  gl.clearColor(0, 0, 0, 0); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT); gl.enable(gl.DEPTH_TEST);
+  gl.clearColor(...ground, 1); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT); gl.enable(gl.DEPTH_TEST);
   const { machineFromPart, machineFromTool } = pose(q), inPart = byId("frame").value === "part";
   const partModel = inPart ? identity() : machineFromPart;
   const toolModel = inPart ? multiply(rigidInverse(machineFromPart), machineFromTool) : machineFromTool;
@@ -229,17 +230,17 @@ function draw() {
   }
   if (marks.length) {
     gl.disable(gl.DEPTH_TEST); attribute(0, markBuffer, 12, 0); attribute(2, null); gl.vertexAttrib3f(2, 0.85, 0.1, 0.1);
-    gl.uniform1f(uniforms.size, 7 * ratio); gl.drawArrays(gl.POINTS, 0, marks.length);
+    gl.uniform1f(uniforms.size, 5 * ratio); gl.drawArrays(gl.POINTS, 0, marks.length);
     if (picked?.point) { gl.uniform1f(uniforms.size, 16 * ratio); gl.drawArrays(gl.POINTS, marks.indexOf(picked), 1); }
     gl.enable(gl.DEPTH_TEST);
   }
   if (byId("machine").checked) {
-    gl.enable(gl.BLEND); gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA); attribute(2, null);
-    for (const [bodies, model, colour, alpha] of [[work, partModel, [0.55, 0.57, 0.6], 0.35], [tool, toolModel, [0.75, 0.6, 0.35], 0.6]]) {
+    gl.enable(gl.BLEND); gl.enable(gl.CULL_FACE); gl.depthMask(false); gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE); attribute(2, null);
+    for (const [bodies, model, colour, alpha] of [[work, partModel, [0.55, 0.57, 0.6], 0.3], [tool, toolModel, [0.75, 0.6, 0.35], 0.45]]) {
       gl.uniformMatrix4fv(uniforms.model, false, model); gl.uniform1f(uniforms.alpha, alpha); gl.vertexAttrib3f(2, ...colour);
       for (const body of bodies) { attribute(0, body.data, 24, 0); attribute(1, body.data, 24, 12); gl.drawArrays(gl.TRIANGLES, 0, body.n); }
     }
-    gl.disable(gl.BLEND);
+    gl.disable(gl.BLEND); gl.disable(gl.CULL_FACE); gl.depthMask(true);
   }
 }
 
@@ -270,6 +271,9 @@ function drawPlots() {
         pen.lineTo(x, y(high[x])); last = x;
       }
       pen.stroke();
+      pen.globalAlpha = 0.75; pen.fillStyle = getComputedStyle(document.body).backgroundColor;
+      pen.fillRect(0, b * band, pen.measureText(`${plot.name}  ${least.toFixed(1)} … ${most.toFixed(1)}`).width + 12 * ratio, 15 * ratio);
+      pen.globalAlpha = 1; pen.fillStyle = ink;
       pen.fillText(`${plot.name}  ${least.toFixed(1)} … ${most.toFixed(1)}`, 6 * ratio, b * band + 12 * ratio);
     });
     plotImage = pen.getImageData(0, 0, width, height);
