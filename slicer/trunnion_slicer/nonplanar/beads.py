@@ -64,9 +64,7 @@ def beads_of(on: Sheet, settings: PrintSettings) -> list[Bead]:
 
 def _thickness(lifted: Lifted) -> FloatArray:
     """(n,) mm along the normal, of the layer under the piece that ends at each row."""
-    run = np.zeros(len(lifted.points))
-    run[1:] = np.linalg.norm(np.diff(lifted.points[:, :2], axis=0), axis=1)
-    vertical = lifted.volume / np.maximum(run, 1e-9)
+    vertical = lifted.volume / np.maximum(lifted.run, 1e-9)
     first = lifted.starts[:-1]
     vertical[first] = vertical[np.minimum(first + 1, len(vertical) - 1)]
     return np.asarray(vertical * lifted.axes[:, 2])
@@ -77,7 +75,8 @@ def _beads(paths: Sequence[FlatPath], lifted: Lifted, axes: FloatArray, height: 
     length = np.zeros(len(axes))
     length[1:] = np.linalg.norm(np.diff(lifted.points, axis=0), axis=1)
     share = np.repeat([path.share for path in paths], np.diff(starts))
-    area = lifted.volume * share / np.maximum(length, 1e-9)
+    # Where a tiny bend was dropped the bead is as thick as on the bend, not fatter for the shorter way.
+    area = lifted.volume * share / np.maximum(np.maximum(length, lifted.run), 1e-9)
     first: IntArray = starts[:-1]
     area[first] = area[np.minimum(first + 1, len(area) - 1)]
     width = bead_width(area, height)

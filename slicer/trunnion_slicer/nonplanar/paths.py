@@ -8,7 +8,8 @@ its share: how many mm of footprint it has to fill across its line, from which t
 from dataclasses import dataclass
 
 import numpy as np
-from shapely.geometry import MultiPolygon
+import shapely
+from shapely.geometry import LineString, MultiPolygon
 from trunnion_core.arrays import FloatArray, freeze
 from trunnion_core.bead import bead_spacing
 from trunnion_core.roles import Role
@@ -17,7 +18,8 @@ from trunnion_core.settings import PrintSettings
 from trunnion_slicer.infill import fill
 from trunnion_slicer.nonplanar.normals import face_normals
 from trunnion_slicer.nonplanar.offset import Surfaces
-from trunnion_slicer.walls import offset, walls
+from trunnion_slicer.thin import bare, gaps, middle_lines
+from trunnion_slicer.walls import as_multipolygon, offset, wall_lines, walls
 
 STEEP_SHARE = 0.8
 """Share of a patch on which lines are no farther apart than nominal; on the steeper rest beads are laid wider."""
@@ -54,13 +56,31 @@ def flat_paths(stack: Surfaces, layer: int, outline: MultiPolygon, settings: Pri
     # fill's own spacing, less what it is to run into the wall.
     edge = (width / 2 + (count - 0.5) * spacing) * squeeze if count else (width - spacing) / 2
     inset = pitch / 2 - settings.infill_overlap / 100 * width
-    for island in offset(outline, -edge - inset).geoms:
+    inside = offset(outline, -edge)
+    narrow = gaps(outline, wall_lines(outline, count, width * squeeze, spacing * squeeze), width, spacing)
+    covered = []
+    for island in offset(inside, -inset).geoms:
         lines = fill(settings.fill_pattern, MultiPolygon([island]), pitch, float(angle))
         length = sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines)
         if length > 0:
-            share = offset(island, inset).area / length
+            whole = offset(island, inset)
+            beside = shapely.union_all(shapely.buffer([LineString(line) for line in lines], pitch / 2))
+            missed = bare(whole, as_multipolygon(beside), width)
+            share = (whole.area - missed.area) / length
             paths += [FlatPath(line, share, Role.NONPLANAR_INFILL) for line in lines]
-    return paths
+            covered.append(whole)
+            narrow.append(missed)
+    narrow.append(bare(inside, as_multipolygon(shapely.union_all(covered)), width))
+    return paths + [path for region in narrow for path in _single_lines(region, width)]
+
+
+def _single_lines(region: MultiPolygon, width: float) -> list[FlatPath]:
+    """One path along the middle of each place too narrow for more."""
+    return [
+        FlatPath(line, float(wide.mean()), Role.NONPLANAR_INFILL)
+        for line, wide in middle_lines(region, width)
+        if float(wide.mean()) > 0
+    ]
 
 
 def _across_cosine(stack: Surfaces, layer: int, angle: float) -> float:

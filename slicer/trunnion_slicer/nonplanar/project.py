@@ -41,11 +41,13 @@ class Lifted:
     """(n, 3) unit, the averaged normals."""
     volume: FloatArray
     """(n,) mm³ per mm of share of the piece that ends at the row, 0 in the first row of a path."""
+    run: FloatArray
+    """(n,) mm of path, seen from above, of that piece; a little more than from row to row where a bend was dropped."""
     starts: IntArray
     """(paths + 1,)"""
 
     def __post_init__(self) -> None:
-        freeze(self.points, self.axes, self.volume, self.starts)
+        freeze(self.points, self.axes, self.volume, self.run, self.starts)
 
 
 def lift(
@@ -63,7 +65,7 @@ def lift(
     replaces the corners' densities by ones that change within a triangle, looked up every DENSITY_STEP.
     """
     if not lines:
-        return Lifted(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64))
+        return Lifted(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(1, np.int64))
     flat = np.concatenate(lines)
     starts = np.concatenate([[0], np.cumsum([len(line) for line in lines])]).astype(np.int64)
     flat, starts = grid.cut(flat, starts)
@@ -72,15 +74,14 @@ def lift(
         points, axes, starts = _divided(points, axes, starts)
         density = density_at(points, axes)
     run = np.zeros(len(points))
-    run[1:] = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1) * (density[1:] + density[:-1]) / 2
+    run[1:] = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
     run[starts[:-1]] = 0.0
+    volume = run.copy()
+    volume[1:] *= (density[1:] + density[:-1]) / 2
     keep = thinned(points, axes, density, starts, CHORD, AXIS_CHORD, DENSITY_CHORD, SHORTEST)
     rows = np.flatnonzero(keep)
-    total = np.cumsum(run)
-    volume = np.diff(total[rows], prepend=0.0)
-    new_starts = np.searchsorted(rows, starts)
-    volume[new_starts[:-1]] = 0.0
-    return Lifted(points[rows], axes[rows], volume, new_starts)
+    volume, run = (np.diff(np.cumsum(value)[rows], prepend=0.0) for value in (volume, run))
+    return Lifted(points[rows], axes[rows], volume, run, np.searchsorted(rows, starts))
 
 
 def _divided(points: FloatArray, axes: FloatArray, starts: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
