@@ -15,6 +15,8 @@ from trunnion_kinematics.chain_kernels import lean, solve
 from trunnion_kinematics.reach import LIMIT_SLACK
 
 TURN = 2 * math.pi
+SLOPE_SLACK = 1 + 1e-9
+"""Rounding of sums of times."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -80,8 +82,10 @@ def choice_kernel(
     state.
 
     All windings of a pair of candidates share the price of a step, so the step is priced once for each difference of
-    windings, the least turn first, and no further once none can be better: O(candidates^2 x windings) a row. Rows that
-    extrude are tried without jumps first, and with them only if no state is reached at all.
+    windings, the least turn first, and no further once none can be better: O(candidates^2 x windings) a row. None can
+    be better, too, where one turn more adds its whole time to the price, and the values of neighbouring windings differ
+    by no more than that: then a source one turn nearer is at least as good. Rows that extrude are tried without jumps
+    first, and with them only if no state is reached at all.
     """
     n = offset.shape[0] - 1
     free1, free2 = windings[0] == 0, windings[1] == 0
@@ -91,7 +95,7 @@ def choice_kernel(
     for i in range(n):
         most = max(most, offset[i + 1] - offset[i])
     value, before = np.empty(most * per), np.empty(most * per)
-    least = np.empty(most)
+    least, slope = np.empty(most), np.empty(most)
     base, base_before = np.empty((most, 2)), np.empty((most, 2))
     for i in range(n):
         value, before = before, value
@@ -146,6 +150,14 @@ def choice_kernel(
                                     break
                                 continue
                             barred = 0
+                            inner = step1 - 2 * TURN
+                            if (
+                                out >= 8
+                                and slope[a] * speed[whole[0]] <= TURN * (1.0 if travel[i] else costs[0]) * SLOPE_SLACK
+                                and inner / speed[whole[0]] >= max(time0, time2)
+                                and jumps == (sweep - (sine[i - 1] + sine[i]) * TURN > sweep_limit[i])
+                            ):
+                                break
                             price = edge(time, time1 + time2, jumps, travel[i], costs)
                             if out % 2 == 1 and least[a] + max(time0, time1 - TURN / speed[whole[0]]) >= worst:
                                 break
@@ -172,6 +184,7 @@ def choice_kernel(
             least[b] = np.inf
             for s in range(b * per, b * per + per):
                 least[b] = min(least[b], value[s])
+            slope[b] = steepest(value[b * per : b * per + per], count1, count2) if count1 > 4 else np.inf
     state = 0
     for s in range((offset[n] - offset[n - 1]) * per):
         if value[s] < value[state]:
@@ -183,6 +196,25 @@ def choice_kernel(
         joints[i, whole[1]] = lifted(candidates[m, whole[1]], low[1], free2) + TURN * (state % count2)
         state = pointer[offset[i] * per + state]
     return int(unwind(whole, joints, free1, free2, start, sine, sine2, sweep_limit, jump))
+
+
+@njit(cache=True, error_model="numpy")
+def steepest(values: FloatArray, count1: int, count2: int) -> float:
+    """Greatest difference between windings of rotary 1 next to each other; inf where finite ones have a gap."""
+    result = 0.0
+    for w2 in range(count2):
+        begun = ended = False
+        for w1 in range(count1):
+            here = values[w1 * count2 + w2]
+            if here == np.inf:
+                ended = begun
+            elif ended:
+                return np.inf
+            elif begun:
+                result = max(result, abs(here - values[(w1 - 1) * count2 + w2]))
+            else:
+                begun = True
+    return float(result)
 
 
 @njit(cache=True, error_model="numpy")
