@@ -175,3 +175,36 @@ def test_speed_must_be_a_factor(profile: MachineProfile) -> None:
     for speed in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="as fast as possible"):
             SoftwareMachine(profile, speed=speed)
+
+
+def test_a_port_comes_back_under_another_name_and_the_machine_knows_its_numbers(
+    profile: MachineProfile, tmp_path: Path
+) -> None:
+    machine = SoftwareMachine(profile, speed=None, faults=[parse_fault("unplug:line=3,seconds=0.2")])
+    link = tmp_path / "printer"
+    names: list[str] = []
+    stop, again = threading.Event(), threading.Event()
+
+    def ready(name: str) -> None:
+        names.append(name)
+        again.set()
+
+    thread = threading.Thread(target=serve_pty, args=(machine, link, stop), kwargs={"ready": ready})
+    thread.start()
+    try:
+        assert again.wait(10.0)
+        with serial.Serial(str(link), 250000, timeout=10) as port:
+            for n in (1, 2):
+                port.write(numbered(n, "M107"))
+                port.read_until(b"ok\n")
+            again.clear()
+            port.write(numbered(3, "M107"))
+            assert again.wait(10.0)
+        with serial.Serial(str(link), 250000, timeout=10) as port:
+            port.write(b"M110\n")
+            assert port.read_until(b"ok\n").endswith(b"Line: 3\nok\n")
+    finally:
+        stop.set()
+        thread.join()
+    assert len(names) == 2
+    assert not link.is_symlink()

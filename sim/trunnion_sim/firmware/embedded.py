@@ -45,7 +45,10 @@ class Pace:
 
 
 class EmbeddedPort:
-    """What a host opens instead of a device; any thread may read, write and close."""
+    """What a host opens instead of a device; any thread may read, write and close.
+
+    After the machine was unplugged a port stays dead; once it is back, a new one reaches it.
+    """
 
     def __init__(self, machine: SoftwareMachine) -> None:
         self.machine = machine
@@ -53,6 +56,7 @@ class EmbeddedPort:
         self._pace = Pace(machine)
         self._out = bytearray()
         self._closed = False
+        self._gone = False
 
     def write(self, data: bytes) -> None:
         """Send bytes to the machine. Raises OSError once the port is closed or gone."""
@@ -92,5 +96,6 @@ class EmbeddedPort:
     def _check(self) -> None:
         if self._closed:
             raise OSError("the port is closed")
-        if not self.machine.connected:
+        self._gone = self._gone or not self.machine.connected
+        if self._gone:
             raise OSError("the port is gone: the printer was unplugged")

@@ -59,7 +59,7 @@ KINDS: dict[str, Kind] = {
     "maxtemp": Kind("firmware", "a heater's switch fuses shut", {"heater": "nozzle"}),
     "sensor-open": Kind("firmware", "a thermistor is interrupted (MINTEMP)", {"heater": "nozzle"}),
     "sensor-short": Kind("firmware", "a thermistor is shorted (MAXTEMP)", {"heater": "nozzle"}),
-    "unplug": Kind("firmware", "the port is gone"),
+    "unplug": Kind("firmware", "the port is gone; back after seconds, or never with 0", {"seconds": 0.0}),
     "slow-busy": Kind("firmware", "a command takes long, and says so", {"seconds": 180.0}),
     "slow-silent": Kind("firmware", "a command takes long without a word", {"seconds": 30.0}),
     "ring": Kind("firmware", "from here on the receive ring is smaller", {"size": 32.0}),

@@ -65,8 +65,8 @@ class SoftwareMachine:
         self.executed: list[str] = []
         """Every command that the firmware knew, in the order of execution, without number and checksum."""
         self.advanced_ok = advanced_ok
-        self.connected = True
-        """False once the cable was pulled."""
+        self.unplugged_until = -math.inf
+        """Machine time at which the cable is in again."""
         self._faults = FaultPlan(faults, seed)
         self._timed = deque(self._faults.timed)
         self._out = Answers(self._faults)
@@ -166,6 +166,11 @@ class SoftwareMachine:
         """What the machine has said since the last time."""
         said = self._out.take()
         return said if self.connected else b""
+
+    @property
+    def connected(self) -> bool:
+        """Whether the cable is in."""
+        return self.now >= self.unplugged_until
 
     @property
     def working(self) -> bool:

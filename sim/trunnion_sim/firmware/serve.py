@@ -1,6 +1,7 @@
 """A software machine behind a pseudo terminal or a TCP port, for hosts that are other programs."""
 
 import contextlib
+import math
 import os
 import select
 import socket
@@ -30,25 +31,13 @@ def serve_pty(
 ) -> None:
     """Serve on a new pseudo terminal until `stop` is set; `link` becomes a symbolic link to it.
 
-    `ready` is called with the name of the terminal. Raises StreamError where the link cannot be made.
+    A machine that was unplugged and comes back gets another terminal. `ready` is called with the name of each.
+    Raises StreamError where the link cannot be made.
     """
-    ours, theirs = os.openpty()
-    try:
-        tty.setraw(theirs)
-        os.set_blocking(ours, False)
-        name = os.ttyname(theirs)
-        if link is not None:
-            _make_link(link, name)
-        if ready is not None:
-            ready(name)
-        try:
-            _serve(machine, ours, stop)
-        finally:
-            if link is not None and link.is_symlink() and str(link.readlink()) == name:
-                link.unlink()
-    finally:
-        os.close(ours)
-        os.close(theirs)
+    while True:
+        _one_terminal(machine, link, stop, ready)
+        if not _plugged_in_again(machine, stop):
+            return
 
 
 def serve_tcp(
@@ -80,8 +69,39 @@ def serve_tcp(
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 connection.setblocking(False)
                 _serve(machine, connection.fileno(), stop)
-            if not machine.connected:
+            if not machine.connected and not _plugged_in_again(machine, stop):
                 return
+
+
+def _one_terminal(
+    machine: SoftwareMachine, link: Path | None, stop: threading.Event, ready: Callable[[str], None] | None
+) -> None:
+    ours, theirs = os.openpty()
+    try:
+        tty.setraw(theirs)
+        os.set_blocking(ours, False)
+        name = os.ttyname(theirs)
+        if link is not None:
+            _make_link(link, name)
+        if ready is not None:
+            ready(name)
+        try:
+            _serve(machine, ours, stop)
+        finally:
+            if link is not None and link.is_symlink() and str(link.readlink()) == name:
+                link.unlink()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def _plugged_in_again(machine: SoftwareMachine, stop: threading.Event) -> bool:
+    """Wait while the cable is out; False where the end has come or it never goes in again."""
+    pace = Pace(machine)
+    while not stop.is_set() and not machine.connected and math.isfinite(machine.unplugged_until):
+        stop.wait(pace.sleep())
+        machine.advance(pace.elapsed())
+    return machine.connected and not stop.is_set()
 
 
 def _serve(machine: SoftwareMachine, wire: int, stop: threading.Event) -> None:

@@ -1,5 +1,6 @@
 """What each firmware fault does to the machine."""
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -72,7 +73,7 @@ def _sensor_short(machine: "SoftwareMachine", fault: Fault) -> None:
 
 
 def _unplug(machine: "SoftwareMachine", fault: Fault) -> None:
-    machine.connected = False
+    machine.unplugged_until = machine.now + (fault.number("seconds") or math.inf)
 
 
 def _slow(machine: "SoftwareMachine", fault: Fault) -> Steps:
