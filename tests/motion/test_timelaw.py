@@ -71,6 +71,15 @@ def test_a_right_angle_is_passed_at_the_corner_speed():
     assert_allclose(law.entry[1], 8)
 
 
+def test_a_gentle_corner_slows_just_enough():
+    turn = 0.12
+    joints = np.zeros((3, 5))
+    joints[1, 0] = 50
+    joints[2, :2] = [50 + 50 * np.cos(turn), 50 * np.sin(turn)]
+    law = law_of(joints, 100)
+    assert_allclose(law.entry[1] * np.sin(turn), 8)
+
+
 def test_junction_deviation_replaces_the_corner_speed():
     joints = np.zeros((3, 5))
     joints[1:, 0] = 50
