@@ -3,7 +3,8 @@
 Section 2.3 of Shahid 2024: faces that look up with a slope of at most the threshold angle (equation 1), without those
 that have material above them, found by rays cast straight up. The rays start at the corners of each face, moved
 inwards a little so that neighbours are not hit, and at points spread over large faces. Rays cast down at the same time
-find faces whose material underneath is too thin to carry non-planar layers.
+find faces whose material underneath is too thin to carry non-planar layers. What is flat anyway (a top, the floor of
+a groove) stays planar, and so does what is too small to be worth it.
 """
 
 import numpy as np
