@@ -12,7 +12,7 @@ CODES = {
     "bead-in-air": ("error", "A whole bead has nothing below it and nothing beside it."),
     "long-bridge": ("warning", "A long stretch of a bead hangs in the air."),
     "bead-over-bead": ("error", "A bead is laid where there is a bead already."),
-    "crowded-bead": ("warning", "A bead has less than half the room that its plastic needs."),
+    "crowded-bead": ("warning", "A bead has less than two thirds of the room that its plastic needs."),
     "travel-through-print": ("error", "The tip travels through what is printed."),
 }
 
@@ -22,7 +22,7 @@ BRIDGE = 20.0
 """mm that ordinary filament bridges with ease."""
 LONGEST_DOUBLE = 5.0
 """mm: seams and corners overlap themselves for shorter stretches."""
-OVER, CROWDED = 0.8, 0.5
+OVER, CROWDED = 0.6, 0.35
 """Share of a bead's plastic that found other plastic in its place."""
 DIP = 0.4
 """Of a layer height: how far a travel may dip into the round top of a bead that stands a little proud."""

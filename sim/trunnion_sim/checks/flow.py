@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from trunnion_core.arrays import FloatArray
 from trunnion_core.bead import bead_area
 from trunnion_core.findings import Finding
 
@@ -18,6 +19,8 @@ OFF = 0.15
 WRONG = 1.5
 RATE_SLACK = 0.02
 """Relative, for rounding."""
+SMOOTH = 1.0
+"""mm: rows shorter than this are judged together with their neighbours, since comments round and rows were merged."""
 LEAST = 0.05
 """mm of tip travel under which the rounding of E says more than the bead."""
 
@@ -30,7 +33,11 @@ def check(context: Context) -> Iterator[Finding]:
     width, height = context.rows.width, context.rows.height
     named = rows & np.isfinite(width) & np.isfinite(height) & (width > 0) & (height > 0) & context.rows.bead
     planned = np.where(named, bead_area(np.where(named, width, 1.0), np.where(named, height, 1.0)), 1.0)
-    ratio = np.where(named, section / planned, 1.0)
+    short = context.tip_length < SMOOTH
+    laid = np.where(named, volume, 0.0)
+    meant = np.where(named, planned * context.tip_length, 0.0)
+    together = np.divide(_around(laid), _around(meant), out=np.ones(len(volume)), where=named)
+    ratio = np.where(named, np.where(short, together, section / planned), 1.0)
     wrong = (ratio > WRONG) | (ratio < 1 / WRONG)
     off = (np.abs(ratio - 1) > OFF) & ~wrong
 
@@ -53,3 +60,9 @@ def check(context: Context) -> Iterator[Finding]:
         value=rate,
         limit=most,
     )
+
+
+def _around(values: FloatArray) -> FloatArray:
+    """(n,) each value plus its two neighbours."""
+    padded = np.pad(values, 1)
+    return np.asarray(padded[:-2] + padded[1:-1] + padded[2:])

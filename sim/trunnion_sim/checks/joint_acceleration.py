@@ -15,9 +15,9 @@ CODES = {
         "error",
         "Limits raised by the program (M201, M204) let a joint accelerate harder than it is rated for.",
     ),
-    "corner-jump": (
+    "corner-raised": (
         "warning",
-        "The speed of a joint jumps at a corner by more than its corner speed allows.",
+        "Limits raised by the program (M205, M566) let joints jump at corners by more than they are rated for.",
     ),
 }
 
@@ -26,7 +26,7 @@ SLACK = 0.01
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """Acceleration inside moves and jumps between them, as replayed."""
+    """Acceleration inside moves as replayed, and the corner speeds that the program sets."""
     replay, profile = context.replay, context.profile
     length = np.where(replay.length > 0, replay.length, np.inf)[:, None]
     ratio = (context.motion.joints - context.motion.before) / length
@@ -43,36 +43,18 @@ def check(context: Context) -> Iterator[Finding]:
             limit=joint.acceleration,
             joint=joint,
         )
-        if profile.planner.junction_deviation is not None:
-            continue
-        moving = np.flatnonzero(replay.length > 0)
-        jump = np.zeros(len(ratio))
-        leave = ratio[moving, k] * replay.exit[moving]
-        enter = ratio[moving, k] * replay.entry[moving]
-        jump[moving[1:]] = np.abs(enter[1:] - leave[:-1])
-        # a reversal counts by its larger side, so the jump may be twice the corner speed
-        limit = 2 * joint.corner_speed * (1 + SLACK) + 1e-9
-        jumps = (jump > limit) & ~context.homing
-        yield from context.find(
-            "corner-jump",
-            "warning",
-            jumps,
-            partial(_jump, joint, jump),
-            value=jump,
-            limit=2 * joint.corner_speed,
-            joint=joint,
-        )
+    corner = profile.array("corner_speed") * profile.to_shown * (1 + SLACK)
+    raised = (context.limits.corner[:, :-1] > corner).any(axis=1)[context.limits.which]
+    yield from context.find(
+        "corner-raised",
+        "warning",
+        raised & context.moved & ~context.homing,
+        lambda row: "the program works with higher corner speeds (M205, M566) than the machine is rated for",
+    )
 
 
 def _hard(joint: Joint, hard: FloatArray, row: int) -> str:
     return (
         f"{joint.letter} accelerates with {joint.shown(hard[row]):.4g} {joint.unit}/s², "
         f"it is rated for {joint.shown(joint.acceleration):g}"
-    )
-
-
-def _jump(joint: Joint, jump: FloatArray, row: int) -> str:
-    return (
-        f"{joint.letter} jumps by {joint.shown(jump[row]):.4g} {joint.unit}/s at a corner, "
-        f"its corner speed is {joint.shown(joint.corner_speed):g}"
     )

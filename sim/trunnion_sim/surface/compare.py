@@ -77,7 +77,7 @@ def facet_normals(model: Mesh) -> FloatArray:
     """(m, 3) unit; zero for facets without area."""
     across = _cross(model)
     size = np.linalg.norm(across, axis=1, keepdims=True)
-    return np.divide(across, size, out=np.zeros_like(across), where=size > 0)
+    return np.asarray(np.divide(across, size, out=np.zeros_like(across), where=size > 0))
 
 
 def _areas(model: Mesh) -> FloatArray:

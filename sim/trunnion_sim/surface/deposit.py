@@ -4,7 +4,8 @@ r"""Lay every bead of a program down in order, on what is there, and keep the su
 Its upper side is the surface that the flat of the nozzle sweeps: the tip's path, level across it at right angles to the
 tool. It reaches down to what lies below (the bed, other beads), at a gap `h` measured under the bore, and sideways as
 far as the area needs: the section is a stadium of height h and width (A - pi/4 h²) / h + h (the flow model of Slic3r,
-https://manual.slic3r.org/advanced/flow-math), with round edges of radius h/2 that nothing fills up later.
+https://manual.slic3r.org/advanced/flow-math), with round edges of radius h/2 that nothing fills up later. Where
+the gap opens sideways, the bead ends where its area is spent.
 
         ____________            free                 ____________ ____________
        /            \           edges               /    first   V   second   \
@@ -12,8 +13,9 @@ https://manual.slic3r.org/advanced/flow-math), with round edges of radius h/2 th
        \____________/                               \____________A____________/    pores below the groove
 
 **No room.** Plastic that finds other plastic in its place first goes into the pores beside and below that the height
-field remembers, then to the other side, where the bead grows wider, at most to the rim of the nozzle's flat plus one
-h; what still has no room rises above the nozzle and stays as a bulge. The groove between two beads is drawn open even
+field remembers. Half of what is left widens the bead on its free side, by a quarter of its half width at most; the
+rest rises behind the nozzle and stays as a bulge. (All to the side would hand the same lack on from line to line for
+ever.) The groove between two beads is drawn open even
 where plastic pressed aside would close it, so the surface drawn is never better than that of round beads.
 
 **Too little.** A bead with less area than a round thread of diameter h is a thread: it drops onto what is below, or

@@ -22,6 +22,8 @@ SEAM = 1e-6
 """mm by which slabs overlap, so that rounding leaves no cell between them."""
 BLOCKED = 0.75
 """Where the gap under the bore is smaller than this share of what it is elsewhere, a neighbour stands."""
+ASIDE = 0.5
+"""Share of the plastic without room that goes to the free side; the rest rises behind the nozzle."""
 REACH = 1.5
 """In thread diameters: gap up to which a thread falls onto what is below."""
 
@@ -209,15 +211,23 @@ def _section(
     contact = False
     reach = half + height / 2
     samples = math.ceil(reach / du)
+    du_side = reach / samples
+    wide = np.array([half, half])
     for side in range(2):
         sign = -1.0 if side == 0 else 1.0
         room = 0.0
+        filled = 0.0
         for k in range(samples):
             u = (k + 0.5) * reach / samples
             x, y = c[0] + sign * u * b[0], c[1] + sign * u * b[1]
             there = _read(top, before, stamp, x0, y0, cell, x, y, since)
             g = (c[2] + sign * u * b[2] - there) * normal_z + shift
             room += min(max(g, 0.0), height)
+            # where the gap opens sideways, the plastic is used up sooner: the bead ends where its area is spent
+            deep = min(max(g, 0.0), max(height, thread))
+            filled += deep * du_side
+            if u < wide[side] and filled - (1 - math.pi / 4) * deep**2 / 2 > area / 2 + height * cell / 8:
+                wide[side] = u
             if u > 0.5 * half and g < 0.6 * height:
                 contact = True
             i, j = round((x - x0) / cell), round((y - y0) / cell)
@@ -226,10 +236,10 @@ def _section(
         lack[side] = max(0.0, area / 2 - bulged / 2 - room * reach / samples - height * cell / 8)
     crowded = lack[0] + lack[1] + bulged
     # what lacks room on one side widens the other
-    wide = np.array([half, half])
     limit = WIDEN * half
     for side in range(2):
-        need = lack[1 - side]
+        need = lack[1 - side] * ASIDE
+        rises = lack[1 - side] - need
         sign = -1.0 if side == 0 else 1.0
         if need > 0 and lack[side] == 0:
             while need > 0 and wide[side] < limit:
@@ -243,7 +253,7 @@ def _section(
                 else:
                     wide[side] += du
                     need -= g * du
-            lack[1 - side] = need
+            lack[1 - side] = need + rises
     bulged += lack[0] + lack[1]
     result[0] = wide[0]
     result[1] = wide[1]
