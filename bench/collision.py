@@ -2,8 +2,8 @@
 
     python bench/collision.py
 
-Both are given the same random clamps and random tilted moves. The oracle looks at poses 0.05 mm apart and measures every
-sample of everything on the bed near the body (vectorised, with a k-d tree). Then segments per second on a print.
+Both are given the same random clamps and random tilted moves. The oracle looks at poses 0.05 mm apart and measures
+every sample of everything on the bed near the body (vectorised, with a k-d tree). Then segments per second on a print.
 """
 
 import sys
@@ -13,7 +13,7 @@ from time import perf_counter
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "sim"))
-from test_collision import BLOCK, NOZZLE, dense_oracle, machine, run, upright
+from test_collision import BLOCK, NOZZLE, dense_oracle, machine, random_clamps, run, upright
 
 SCENES = 20
 STEP = 0.05
@@ -26,15 +26,7 @@ def main() -> None:
     missed = false = entries = 0
     run(machine(NOZZLE), upright([[0, 0, 9], [1, 0, 9]]), np.zeros(2))
     for _ in range(SCENES):
-        clamps = tuple(
-            {
-                "shape": "box",
-                "name": "clamp",
-                "min": [*low, 0],
-                "max": [*(low + rng.uniform(1, 6, 2)), rng.uniform(1, 9)],
-            }
-            for low in rng.uniform(-14, 8, (4, 2))
-        )
+        clamps = random_clamps(rng)
         profile = machine(NOZZLE, BLOCK, clamps=clamps)
         joints = np.column_stack([rng.uniform(-12, 12, (5, 2)), rng.uniform(1, 14, 5), rng.uniform(-0.2, 0.2, (5, 2))])
         started = perf_counter()

@@ -12,6 +12,7 @@ import click
 COMMANDS = {
     "demo": "Run the main job on a sample part: slice, dry run, print on the embedded machine, report.",
     "slice": "Turn a mesh into a program for one machine.",
+    "place": "Find a placement at which a machine can print a mesh.",
     "check": "Dry-run a program in the software machine and judge it.",
     "print": "Stream a program to a printer.",
     "sim": "Be a printer that any host can connect to.",

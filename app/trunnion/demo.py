@@ -63,4 +63,3 @@ def run_demo(part: str, machine: str, folder: Path, say: Callable[[str], None]) 
     say(f"took {stages}")
     say(f"{report.verdict}: {result.executed} commands sent and executed, {data['time_s'] / 60:.1f} min on the machine")
     return page
-

@@ -40,7 +40,7 @@ class Timings:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A solid mesh, placed: `mesh` is in the part frame; `shift` (3,) mm is what was added to the file's coordinates."""
+    """A solid mesh, placed: `mesh` is in the part frame; `shift` (3,) mm was added to the turned file's."""
 
     name: str
     mesh: Mesh
@@ -85,9 +85,7 @@ def solid_part(
     return Part(name, placed, shift, (*findings, *repairs))
 
 
-def make_job(
-    part: Part, profile: MachineProfile, settings: PrintSettings, timings: Timings | None = None
-) -> Job:
+def make_job(part: Part, profile: MachineProfile, settings: PrintSettings, timings: Timings | None = None) -> Job:
     """Slice a part and plan its motion on the machine. Raises UnreachableError, SettingsError or MeshError."""
     timings = timings or Timings()
     settings = settings_for(profile, settings)

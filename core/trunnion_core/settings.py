@@ -80,6 +80,8 @@ class PrintSettings(BaseModel):
         description="Place the part on the middle of the bed, resting on it; otherwise take coordinates as in "
         "the file.",
     )
+    rotate: float = Field(0.0, ge=-360, le=360, description="Turn the part about the vertical first, degrees.")
+    shift: tuple[float, float] = Field((0.0, 0.0), description="Then move the part by this in X and Y, mm.")
     nonplanar_max_angle: float | None = Field(
         None,
         ge=0,

@@ -10,22 +10,36 @@ from trunnion_core.tolerance import PLACEMENT_SLACK
 
 
 def place(mesh: Mesh, profile: MachineProfile, settings: PrintSettings) -> tuple[Mesh, FloatArray]:
-    """The mesh in the part frame of the machine, and the shift (3,) mm that was added to its coordinates.
+    """The mesh in the part frame of the machine, and the shift (3,) mm that was added once it was turned.
 
-    With `settings.center` the middle of its bounding box comes to the middle of the bed and its lowest point to
-    z = 0; without it nothing is moved. Raises PlacementError with all that sticks out by more than PLACEMENT_SLACK:
-    above the height, below the bed, over its edge.
+    The part is turned by `settings.rotate` about the file's Z. With `settings.center` the middle of its bounding box
+    then comes to the middle of the bed and its lowest point to z = 0; last comes `settings.shift`. Raises
+    PlacementError with all that sticks out by more than PLACEMENT_SLACK: above the height, below the bed, over its
+    edge.
     """
-    low, high = mesh.bounds
-    shift = np.zeros(3)
-    if settings.center:
-        middle = _bed_middle(profile)
-        shift = np.array([*(middle - (low + high)[:2] / 2), -low[2]])
-    placed = Mesh(mesh.vertices + shift, mesh.faces)
-    problems = _problems(placed, profile, settings.center)
+    placed, shift = put(mesh, profile, settings)
+    problems = _problems(placed, profile, settings.center and not any(settings.shift))
     if problems:
         raise PlacementError(f"the part does not fit on {profile.name}: " + "; ".join(problems))
     return placed, shift
+
+
+def put(mesh: Mesh, profile: MachineProfile, settings: PrintSettings) -> tuple[Mesh, FloatArray]:
+    """As `place`, without asking whether the part fits."""
+    turned = turn(mesh, settings.rotate)
+    low, high = turned.bounds
+    shift = np.array([*settings.shift, 0.0])
+    if settings.center:
+        shift += [*(_bed_middle(profile) - (low + high)[:2] / 2), -low[2]]
+    return Mesh(turned.vertices + shift, turned.faces), shift
+
+
+def turn(mesh: Mesh, degrees: float) -> Mesh:
+    """The mesh turned right-handed about the Z of its file."""
+    if degrees == 0:
+        return mesh
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return Mesh(mesh.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), mesh.faces)
 
 
 def _bed_middle(profile: MachineProfile) -> FloatArray:

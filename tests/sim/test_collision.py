@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -84,9 +85,8 @@ def test_travel_through_a_wall_is_found_where_it_stands():
     profile = machine(NOZZLE)
     walls = [p for z in np.arange(0.3, 5.1, 0.3) for p in ([0, -8, z], [0, 8, z], [0, 8, 12], [0, -8, 12])]
     path = [[-10, -8, 12], *walls, [-10, 0, 12], [-10, 0, 2], [10, 0, 2]]
-    width = np.array(
-        [0.4 if b[0] == a[0] == 0 and a[2] == b[2] < 6 else 0.0 for a, b in zip(path[:-1], path[1:], strict=True)]
-    )
+    on_wall = [a[0] == b[0] == 0 and a[2] == b[2] < 6 for a, b in pairwise(path)]
+    width = np.where(on_wall, 0.4, 0.0)
     hits = run(profile, upright(path), np.append(0.0, width))
     assert set(hits.rows) == {len(path) - 1}
     assert abs(hits.points[0, 0]) <= 0.4
@@ -112,7 +112,7 @@ def test_a_tilted_head_over_the_bed_is_found_and_a_raised_one_is_not():
     profile = machine(NOZZLE, {"shape": "cylinder", "name": "head", "bottom": 8, "top": 40, "diameter": 60})
     low = np.array([[0, 0, 60, 0, 0], [0, 0, 1, math.radians(40), 0]], dtype=float)
     # at A = 40 degrees the tip is brought back over the part's origin by the linear joints
-    for joints, hit in ((low, True), (low + [0, 0, 40, 0, 0], False)):
+    for joints, hit in ((low, True), (low + np.array([0, 0, 40, 0, 0]), False)):
         tips, _ = forward(profile, joints)
         moved = joints.copy()
         moved[1, :3] -= side_matrices(profile, joints, "work")[1, :3, :3] @ (tips[1] - [0, 0, tips[1, 2]])
@@ -129,8 +129,18 @@ def test_clamps_stand_on_the_bed():
     assert not len(run(profile, upright([[-10, 0, 10], [-10, 0, 7], [12, 0, 7]]), np.zeros(3)).rows)
 
 
+def random_clamps(rng: np.random.Generator) -> tuple[dict[str, object], ...]:
+    low = rng.uniform(-14, 8, (4, 2))
+    high = low + rng.uniform(1, 6, (4, 2))
+    top = rng.uniform(1, 9, 4)
+    return tuple(
+        {"shape": "box", "name": "clamp", "min": [*a, 0], "max": [*b, z]}
+        for a, b, z in zip(low, high, top, strict=True)
+    )
+
+
 def dense_oracle(profile: MachineProfile, joints: np.ndarray, step: float) -> np.ndarray:
-    """(rows, bodies) deepest entry in mm by brute force: poses `step` apart, every column sampled as finely as cells."""
+    """(rows, bodies) deepest entry in mm by brute force: poses `step` apart, columns sampled as finely as cells."""
     scene = make_scene(profile)
     i, j = np.nonzero(scene.ground > -100)
     tops = scene.ground[i, j].astype(float)
@@ -162,15 +172,7 @@ def dense_oracle(profile: MachineProfile, joints: np.ndarray, step: float) -> np
 def test_nothing_is_missed_against_a_dense_oracle(seed):
     """Random clamps, random tilted moves in mid-air and through things: the same rows and bodies, the same depth."""
     rng = np.random.default_rng(seed)
-    clamps = tuple(
-        {
-            "shape": "box",
-            "name": f"clamp{k}",
-            "min": [*low, 0],
-            "max": [*(low + rng.uniform(1, 6, 2)), rng.uniform(1, 9)],
-        }
-        for k, low in enumerate(rng.uniform(-14, 8, (4, 2)))
-    )
+    clamps = random_clamps(rng)
     profile = machine(NOZZLE, BLOCK, clamps=clamps)
     joints = np.column_stack([rng.uniform(-12, 12, (4, 2)), rng.uniform(1, 14, 4), rng.uniform(-0.15, 0.15, (4, 2))])
     expected = dense_oracle(profile, joints, 0.1)

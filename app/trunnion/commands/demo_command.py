@@ -4,15 +4,17 @@ from pathlib import Path
 
 import click
 
-from trunnion.commands.options import machine_option
-
 
 @click.command("demo")
 @click.option("--part", default="freeform", show_default=True, help="Which sample.")
 @click.option("-m", "--machine", default="generic_ab_cradle", show_default=True, help="A machine's name or profile.")
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), default=Path("trunnion-demo"),
-    show_default=True, help="Folder for everything that is made.",
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("trunnion-demo"),
+    show_default=True,
+    help="Folder for everything that is made.",
 )
 def command(part: str, machine: str, output: Path) -> None:
     """Sample mesh, slice, dry run, print on the embedded software machine, report with pictures."""

@@ -17,7 +17,6 @@ def command(joints: Path, machine: str, output: Path) -> None:
     Writes points (n, 3) in mm and tool_axes (n, 3), in the part frame.
     """
     import numpy as np
-
     from trunnion_core.profile import load_profile
     from trunnion_kinematics.chain import JointChain
 

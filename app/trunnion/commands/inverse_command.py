@@ -18,7 +18,6 @@ def command(poses: Path, machine: str, output: Path) -> None:
     and singularity (n,), the absolute determinant of the orientation Jacobian, 0 at a pole.
     """
     import numpy as np
-
     from trunnion_core.profile import load_profile
     from trunnion_kinematics.chain import JointChain
 
@@ -31,6 +30,5 @@ def command(poses: Path, machine: str, output: Path) -> None:
     chain = JointChain.from_profile(profile)
     joints = chain.inverse(points, axes) * profile.to_shown
     with whole_file(output) as path, path.open("wb") as file:
-        np.savez_compressed(
-            file, joints=joints, reachable=np.isfinite(joints).all(axis=2).any(axis=0), singularity=chain.singularity(axes)
-        )
+        reachable = np.isfinite(joints).all(axis=2).any(axis=0)
+        np.savez_compressed(file, joints=joints, reachable=reachable, singularity=chain.singularity(axes))

@@ -14,9 +14,7 @@ from trunnion.commands.options import machine_option
 @click.option("--speed", default="1", metavar="FACTOR|max", help="How much faster than real time; max: no waiting.")
 @click.option("--fault", "faults", multiple=True, metavar="SPEC", help="Misbehave so; may be given several times.")
 @click.option("--seed", default=0, help="Seed of everything random, for a replay.")
-def command(
-    machine: str, pty: Path | None, tcp: str | None, speed: str, faults: tuple[str, ...], seed: int
-) -> None:
+def command(machine: str, pty: Path | None, tcp: str | None, speed: str, faults: tuple[str, ...], seed: int) -> None:
     """Be a printer. Runs until it is told to stop (Ctrl-C)."""
     import threading
 
@@ -39,7 +37,7 @@ def command(
         elif tcp is not None:
             host, _, port = tcp.rpartition(":")
             if not host or not port.isdigit() or not 0 <= int(port) < 65536:
-                raise click.BadParameter(f"'{tcp}' should be HOST:PORT, for instance 127.0.0.1:4000", param_hint="--tcp")
+                raise click.BadParameter(f"'{tcp}' should be HOST:PORT, as in 127.0.0.1:4000", param_hint="--tcp")
             click.echo(f"listening on {host}:{port}", err=True)
             serve_tcp(software, host, int(port), stop)
     finally:
