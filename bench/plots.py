@@ -2,8 +2,8 @@
 
     python bench/plots.py [OUT.png]
 
-A dome's cap printed along its normals on a table whose platter makes the upright tool a pole, and on the A-B cradle,
-which has none: the same toolpath, the same plastic, other joints.
+A dome's cap printed along its normals on the A-B cradle, which has no pole at the upright tool, and on a table whose
+platter has one: there without and with a tolerance for the tool's direction. The same toolpath, the same plastic.
 """
 
 import sys
@@ -21,7 +21,11 @@ from trunnion_core.toolpath import Toolpath
 from trunnion_motion.plan import PlanResult, plan_motion
 from trunnion_motion.timelaw import speeds_at
 
-MACHINES = {"generic_ab_cradle": "A-B cradle", "open5x_voron0": "B-C table"}
+CASES = (
+    ("generic_ab_cradle", 0.0, "A-B cradle"),
+    ("open5x_voron0", 0.0, "B-C table, tool exact"),
+    ("open5x_voron0", 5.0, "B-C table, 5° tolerance"),
+)
 
 
 def main() -> None:
@@ -29,12 +33,12 @@ def main() -> None:
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / "docs" / "pictures" / "motion.png"
     out.parent.mkdir(parents=True, exist_ok=True)
     toolpath = cap()
-    figure, axes = plt.subplots(3, len(MACHINES), figsize=(11, 6.5), sharex="col", sharey="row", dpi=75)
-    for column, (name, title) in enumerate(MACHINES.items()):
+    figure, axes = plt.subplots(3, len(CASES), figsize=(13, 6.5), sharex="col", sharey="row", dpi=72)
+    for column, (name, tolerance, title) in enumerate(CASES):
         profile = load_profile(name)
-        result = plan_motion(toolpath, profile, PrintSettings(layer_height=0.3))
+        result = plan_motion(toolpath, profile, PrintSettings(layer_height=0.3, nonplanar_axis_tolerance=tolerance))
         seconds, joints, tip, flow = traces(result, profile.filament_area)
-        axes[0, column].set_title(f"{title} ({name}): {result.program.duration.sum():.0f} s")
+        axes[0, column].set_title(f"{title}: {result.program.duration.sum():.0f} s")
         for joint, letter in enumerate(profile.letters):
             axes[0, column].plot(seconds, joints[:, joint] / profile.array("speed")[joint], lw=0.7, label=letter)
         axes[1, column].plot(seconds, tip, lw=0.7, color="black")
