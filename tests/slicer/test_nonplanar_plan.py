@@ -297,3 +297,16 @@ def test_the_same_input_gives_the_same_beads() -> None:
     for one, other in zip(plan.layers[0].beads, again.layers[0].beads, strict=True):
         assert (one.points == other.points).all()
         assert (one.width == other.width).all()
+
+
+def test_lines_across_a_slope_are_a_bead_apart_on_the_surface() -> None:
+    mesh = SHAPES["wedge_30"]()
+    plan = plan_nonplanar(mesh, PrintSettings(**BASE, nonplanar_fill_angle=90.0))
+    assert plan is not None
+    (fill,) = [bead for bead in plan.layers[0].beads if bead.role == Role.NONPLANAR_INFILL]
+    step = np.diff(fill.points, axis=0)
+    along = np.abs(step[:, 1]) > 10 * np.abs(step[:, 0])
+    lines = np.unique(np.round(fill.points[1:][along][:, 0], 3))
+    apart = np.diff(lines) / np.cos(np.radians(30.0))
+    spacing = 0.4 - 0.3 * (1 - np.pi / 4)
+    assert_allclose(apart, spacing, rtol=0.02)
