@@ -34,7 +34,7 @@ REWIND_COST = 3.0
 STRAY = 0.01
 """rad that the tool may sweep in a step beyond three times the angle between the two tool axes before it is a jump."""
 
-ENOUGH_WINDINGS = 3
+ENOUGH_WINDINGS = 5
 """From so many windings on, the path is first sought without limits, where only the nearest winding matters."""
 
 MOST_WINDINGS = 128

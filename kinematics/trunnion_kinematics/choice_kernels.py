@@ -97,9 +97,11 @@ def choice_kernel(
     value, before = np.empty(most * per), np.empty(most * per)
     least, slope = np.empty(most), np.empty(most)
     base, base_before = np.empty((most, 2)), np.empty((most, 2))
+    ends, ends_before = np.zeros((most, 2), np.int64), np.zeros((most, 2), np.int64)
     for i in range(n):
         value, before = before, value
         base, base_before = base_before, base
+        ends, ends_before = ends_before, ends
         standing = arrived = False
         for attempt in range(2):
             may_jump = travel[i] or attempt == 1
@@ -113,6 +115,7 @@ def choice_kernel(
                 base[b, 1] = lifted(candidates[m, whole[1]], low[1], free2)
                 ends1 = count(base[b, 0], high[0], count1, free1) if usable[m] else 0
                 ends2 = count(base[b, 1], high[1], count2, free2) if usable[m] else 0
+                ends[b] = ends1, ends2
                 if ends1 == 0 or ends2 == 0:
                     continue
                 standing = True
@@ -134,11 +137,13 @@ def choice_kernel(
                         time0 = max(time0, abs(candidates[m, c] - candidates[offset[i - 1] + a, c]) / speed[c])
                     gap1, gap2 = base[b, 0] - base_before[a, 0], base[b, 1] - base_before[a, 1]
                     near1 = -int(np.rint(gap1 / TURN))
-                    for more2 in range(1 - count2, count2):
+                    for more2 in range(1 - ends_before[a, 1], ends2):
                         step2 = abs(nearest(gap2) if free2 else gap2 + TURN * more2)
                         barred = 0
                         for out in range(2 * (count1 + abs(near1)) + 1):
                             more1 = near1 + ((out + 1) // 2 if out % 2 == 1 else -(out // 2))
+                            if more1 <= -ends_before[a, 0] or more1 >= ends1:
+                                continue
                             step1 = abs(nearest(gap1) if free1 else gap1 + TURN * more1)
                             time1, time2 = step1 / speed[whole[0]], step2 / speed[whole[1]]
                             sweep = 0.5 * (sine[i - 1] + sine[i]) * step1 + sine2 * step2
@@ -163,10 +168,10 @@ def choice_kernel(
                                 break
                             if least[a] + price < worst:
                                 first1 = 0 if free1 else max(0, more1)
-                                last1 = 1 if free1 else min(ends1, count1 + more1)
+                                last1 = 1 if free1 else min(ends1, ends_before[a, 0] + more1)
                                 for w1 in range(first1, last1):
                                     v1 = 0 if free1 else w1 - more1
-                                    for w2 in range(max(0, more2), min(ends2, count2 + more2)):
+                                    for w2 in range(max(0, more2), min(ends2, ends_before[a, 1] + more2)):
                                         v = v1 * count2 + w2 - more2
                                         if old[v] + price < cells[w1 * count2 + w2]:
                                             cells[w1 * count2 + w2] = old[v] + price
