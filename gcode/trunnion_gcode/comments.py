@@ -38,9 +38,9 @@ def comments_by_move(
         if kind in VIEWER_TYPE:
             before.setdefault(move, []).append(f";TYPE:{VIEWER_TYPE[kind]}")
         before.setdefault(move, []).append(f";ROLE:{kind.text}")
-    lays = program.width[moves.row] > 0
-    _changing(before, ";WIDTH:", program.width[moves.row], lays)
-    _changing(before, ";HEIGHT:", program.height[moves.row], lays)
+    lays = moves.width > 0
+    _changing(before, ";WIDTH:", moves.width, lays)
+    _changing(before, ";HEIGHT:", moves.height, lays)
     _changing(before, ";SPEED:", program.tip_speed[moves.row], program.tip_speed[moves.row] > 0)
     if dialect.progress is not None:
         _progress(before, moves, dialect.progress)

@@ -39,6 +39,10 @@ class Moves:
     """(m,) planned."""
     metric: FloatArray
     """(m,) length over which the firmware reads F."""
+    width: FloatArray
+    """(m,) mm of the bead; of merged rows the mean over the length of the tip's path."""
+    height: FloatArray
+    """(m,) mm, likewise."""
 
 
 def make_moves(program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> Moves:
@@ -165,4 +169,14 @@ def _measured(
         filament=filament,
         seconds=np.diff(np.cumsum(program.duration)[rows], prepend=0.0),
         metric=dialect.metric(step[:, ~rotary], step[:, rotary], filament),
+        width=_mean_over_merged(program.width, program.tip_length, rows),
+        height=_mean_over_merged(program.height, program.tip_length, rows),
     )
+
+
+def _mean_over_merged(values: FloatArray, length: FloatArray, rows: IntArray) -> FloatArray:
+    """(m,) values at `rows`; where rows were merged into one, the mean weighted by length."""
+    along = np.diff(np.cumsum(length)[rows], prepend=0.0)
+    total = np.diff(np.cumsum(values * length)[rows], prepend=0.0)
+    merged = (np.diff(rows, prepend=-1) > 1) & (values[rows] > 0) & (along > 0)
+    return np.asarray(np.where(merged, total / np.where(along > 0, along, 1.0), values[rows]))

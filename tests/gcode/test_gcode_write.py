@@ -184,12 +184,18 @@ def test_merged_rows_stay_close_to_the_path_and_keep_time_and_filament() -> None
         role=np.r_[0, np.full(1999, 5)].astype(np.int64),
         layer=np.zeros(2000, dtype=np.int64),
         filament=np.r_[0.0, np.full(1999, 0.0005)],
+        width=np.full(2000, 0.4),
+        tip_length=np.full(2000, 0.014),
         duration=np.full(2000, 0.001),
     )
     moves = make_moves(program, profile, find_dialect("marlin"))
     assert len(moves.row) < 1000
     assert math.isclose(moves.seconds.sum(), 2.0, rel_tol=1e-9)
     assert math.isclose(moves.filament.sum(), program.filament.sum(), abs_tol=1e-5)
+    lumps = np.r_[np.full(1000, 0.2), np.full(1000, 0.3)]
+    uneven = make_moves(dataclasses.replace(program, height=lumps), profile, find_dialect("marlin"))
+    assert math.isclose(uneven.height.mean(), 0.25, abs_tol=2e-3)
+    assert ((uneven.height > 0.201) & (uneven.height < 0.299)).sum() <= 1
     kept = moves.joint_ticks[:, :2] * 1e-4
     for start, end, first, last in zip(moves.row[:-1], moves.row[1:], kept[:-1], kept[1:], strict=True):
         along = (last - first) / np.linalg.norm(last - first)
