@@ -18,9 +18,10 @@ from trunnion.header import placement, read_header
 def check_program(program: Path, profile: MachineProfile, model: Path | None = None) -> Report:
     """Judge a program. With a model, also compare what the beads leave behind with it.
 
-    The model is turned and put where the program's header says the slicer put it; without such a header it is centred
-    on the bed. The surface is compared over facets below equation 1's angle for the program's own layer height and width,
-    whatever angle was printed non-planar, so that planar and non-planar programs are judged over the same facets.
+    The model is turned and put where the program's header says the slicer put it; without such a header it is
+    centred on the bed. The surface is compared over facets below equation 1's angle for the program's own layer
+    height and width, whatever angle was printed non-planar, so that planar and non-planar programs are judged over
+    the same facets.
     Raises GcodeError, MeshError, ProfileError.
     """
     header = read_header(program)

@@ -12,10 +12,7 @@ from trunnion_slicer.mesh_io import write_stl
 
 CUBE = Mesh(
     np.array([[x, y, z] for x in (0.0, 10) for y in (0.0, 10) for z in (0.0, 10)]),
-    np.array(
-        [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
-        + [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
-    ),
+    np.array([[int(corner) for corner in face] for face in "013 032 467 475 045 051 237 276 026 064 157 173".split()]),
 )
 CRADLE = "generic_ab_cradle"
 
