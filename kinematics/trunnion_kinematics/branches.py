@@ -6,6 +6,7 @@ program finds the cheapest sequence of states, where a step costs
 
     time x (2 while extruding) + 0.001 x turning time of the rotaries + 3 for a rewind   (s)
 
+and 0.001 in each free row in which rotary 1 has already turned to an angle that only the rows after the stretch need.
 `time` is the least in which every joint at its top speed, and the tip at the wanted speed, can make the step. A step is
 a *rewind* where it turns the tool through much more than the way between the two tool axes: the tool then leaves the
 part's surface in between, so it belongs into a travel with the nozzle lifted. A row that extrudes may be one only where
@@ -27,6 +28,9 @@ EXTRUDING_WEIGHT = 2.0
 
 TURNING_WEIGHT = 1e-3
 """Cost of a second of turning that costs no time: of equal ways the one that turns least."""
+
+EARLY_COST = 1e-3
+"""s a row. Over planar layers the platter keeps still and turns shortly before it must, not at the first long travel."""
 
 REWIND_COST = 3.0
 """s. Retract, leave, return and prime, besides the motion itself."""
@@ -149,7 +153,7 @@ def _dynamic_program(
     rest = 0.0 if start is None else float(at[chain.rotary[0]])
     free = _free_rows(chain, tool_axes, axis_tolerance)
     for spare in (0, SPARE_ANGLES):
-        offset, run, anchors = _anchors(chain, points, tool_axes, free, rest, spare)
+        offset, run, anchors, early = _anchors(chain, points, tool_axes, free, rest, spare)
         candidates, usable = _candidates(chain, profile, points, tool_axes, offset, run, anchors)
         for windings in _windings_to_try(exact):
             joints, jump = np.empty((len(points), len(at))), np.zeros(len(points), dtype=np.bool_)
@@ -161,6 +165,8 @@ def _dynamic_program(
                 candidates,
                 usable,
                 offset,
+                run,
+                early,
                 windings,
                 *window,
                 profile.array("speed"),
@@ -219,8 +225,9 @@ def _free_rows(chain: JointChain, tool_axes: FloatArray, axis_tolerance: float) 
 
 def _anchors(
     chain: JointChain, points: FloatArray, tool_axes: FloatArray, free: BoolArray, rest: float, spare: int
-) -> tuple[IntArray, IntArray, FloatArray]:
-    """Where each row's candidates lie (n + 1,), the row's run of free rows or -1 (n,), and angles of each run, (r, a).
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Where each row's candidates lie (n + 1,), the row's run of free rows or -1 (n,), angles of each run and their
+    price a row, (r, a).
 
     The angles of rotary 1 worth having in a run of free rows: those of the rows on either side, in both branches, and
     that at rest.
@@ -235,13 +242,16 @@ def _anchors(
         solved = chain.inverse(points[rows[there]], tool_axes[rows[there]])[:, :, chain.rotary[0]]
         angles[there, column : column + 2] = solved.T
     angles[:, 4] = np.pi - (np.pi - rest) % (2 * np.pi)
+    known = angles[:, [0, 1, 4]]
     angles[:, 5:] = rest + np.linspace(-np.pi, np.pi, spare, endpoint=False)
     angles.sort(axis=1)
     angles[:, 1:][np.diff(angles, axis=1) < POLE_ANGLE] = np.nan
     angles.sort(axis=1)
     count = np.full(n, 2)
     count[free] = np.isfinite(angles).sum(axis=1)[run[free]]
-    return np.append(0, np.cumsum(count)), run, angles
+    apart = np.abs(angles[:, :, None] - known[:, None, :])
+    early = np.where((apart < 10 * POLE_ANGLE).any(axis=2), 0.0, EARLY_COST)
+    return np.append(0, np.cumsum(count)), run, angles, early
 
 
 def _candidates(

@@ -59,6 +59,8 @@ def choice_kernel(
     candidates: FloatArray,
     usable: BoolArray,
     offset: IntArray,
+    run: IntArray,
+    early: FloatArray,
     windings: IntArray,
     low: FloatArray,
     high: FloatArray,
@@ -76,10 +78,10 @@ def choice_kernel(
 ) -> int:
     """Fill joints (n, k) with the cheapest sequence of states and jump (n,) with where it jumps.
 
-    windings (2,) states of each rotary, 0 where windings are free. low and high (2,) limits of the rotaries, speed (k,)
-    of all joints. costs: weight of time while extruding, preference for still rotaries, cost of a rewind. start (k,)
-    begins with NaN where there is none. pointer: room for one number a state. Returns -1, or the first row that has no
-    state.
+    run (n,) and early (runs, a): what each anchor of a row's run costs in the row. windings (2,) states of each rotary,
+    0 where they are free. low and high (2,) limits of the rotaries, speed (k,) of all joints. costs: weight of time
+    while extruding, preference for still rotaries, cost of a rewind. start (k,) begins with NaN where there is none.
+    pointer: room for one number a state. Returns -1, or the first row that has no state.
 
     All windings of a pair of candidates share the price of a step, so the step is priced once for each difference of
     windings, the least turn first, and no further once none can be better: O(candidates^2 x windings) a row. None can
@@ -119,12 +121,15 @@ def choice_kernel(
                 if ends1 == 0 or ends2 == 0:
                     continue
                 standing = True
+                ahead = early[run[i], b] if run[i] >= 0 else 0.0
                 if i == 0:
                     arrived = True
                     for s in range(per):
                         if s // count2 < ends1 and s % count2 < ends2:
                             full1, full2 = base[b, 0] + TURN * (s // count2), base[b, 1] + TURN * (s % count2)
-                            cells[s] = opening(whole, candidates[m], full1, full2, free1, free2, start, speed, costs)
+                            cells[s] = ahead + opening(
+                                whole, candidates[m], full1, full2, free1, free2, start, speed, costs
+                            )
                     continue
                 worst = np.inf
                 for a in range(offset[i] - offset[i - 1]):
@@ -163,7 +168,7 @@ def choice_kernel(
                                 and jumps == (sweep - (sine[i - 1] + sine[i]) * TURN > sweep_limit[i])
                             ):
                                 break
-                            price = edge(time, time1 + time2, jumps, travel[i], costs)
+                            price = edge(time, time1 + time2, jumps, travel[i], costs) + ahead
                             if out % 2 == 1 and least[a] + max(time0, time1 - TURN / speed[whole[0]]) >= worst:
                                 break
                             if least[a] + price < worst:

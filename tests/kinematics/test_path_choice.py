@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from trunnion_core.errors import UnreachableError
 from trunnion_core.profile import load_profile
-from trunnion_kinematics.branches import EXTRUDING_WEIGHT, REWIND_COST, STRAY, TURNING_WEIGHT, choose
+from trunnion_kinematics.branches import EARLY_COST, EXTRUDING_WEIGHT, REWIND_COST, STRAY, TURNING_WEIGHT, choose
 from trunnion_kinematics.chain import JointChain
 
 TURN = 2 * np.pi
@@ -46,6 +46,7 @@ class Exhaustive:
         self.sine2 = np.linalg.norm(np.cross(w2, chain.tool_axis))
         dots = np.clip((tool_axes[1:] * tool_axes[:-1]).sum(axis=1), -1, 1)
         self.sweep_limit = np.append(0, 3 * np.arccos(dots) + STRAY)
+        self.known = {}
         self.states = [self.all_states(points, tool_axes, i) for i in range(len(points))]
 
     def all_states(self, points, tool_axes, i):
@@ -61,6 +62,8 @@ class Exhaustive:
             for there in (before, after):
                 if 0 <= there < len(points):
                     angles += list(self.chain.inverse(points[[there]], tool_axes[[there]])[:, 0, c1])
+                if there == before:
+                    self.known[i] = np.array(angles)
             tilts = [row[self.chain.rotary[1]] for row in solutions]
             pairs = np.array([[angle, tilts[0]] for angle in angles])
             solutions = list(self.chain.at_angles(np.repeat(points[[i]], len(pairs), axis=0), pairs))
@@ -74,6 +77,13 @@ class Exhaustive:
                     states.append(state)
         return np.array(states)
 
+    def ahead(self, i, state):
+        """What it costs in row i at the pole to have turned already to an angle that only later rows need."""
+        if i not in self.known:
+            return 0
+        apart = np.mod(self.known[i] - state[self.chain.rotary[0]] + np.pi, TURN) - np.pi
+        return 0 if np.abs(apart).min() < 1e-7 else EARLY_COST
+
     def step(self, i, before, after):
         """Price of a step and whether it is a jump."""
         move = np.abs(after - before) / self.machine.array("speed")
@@ -83,12 +93,12 @@ class Exhaustive:
         price = (
             move.max() * (1 if self.travel[i] else EXTRUDING_WEIGHT) + TURNING_WEIGHT * move[self.chain.rotary].sum()
         )
-        return price + (REWIND_COST if jumps else 0), jumps
+        return price + (REWIND_COST if jumps else 0) + self.ahead(i, after), jumps
 
     def opening(self, state):
         move = np.abs(state - (0 if self.start is None else self.start)) / self.machine.array("speed")
         turning = TURNING_WEIGHT * move[self.chain.rotary].sum()
-        return turning if self.start is None else move.max() + turning
+        return self.ahead(0, state) + turning + (0 if self.start is None else move.max())
 
     def best(self):
         prices, alive = [], np.ones(len(self.states[0]), dtype=bool)
@@ -223,6 +233,7 @@ def test_over_planar_layers_the_platter_stands_still_and_turns_in_the_travel_tha
     turning = np.flatnonzero(np.abs(np.diff(platter[:300])) > 1e-12) + 1
     assert travel[turning].all()
     assert len(turning) <= 1
+    assert (turning >= 200).all()
     assert choice.rewinds.size == 0
     assert np.abs(np.diff(platter))[~travel[1:]].max() < 0.02
 
