@@ -7,20 +7,21 @@ run one command, answer ok, let the planner and the heaters go on meanwhile.
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from trunnion_core.profile import MachineProfile
 from trunnion_core.trace import Trace
 
-from trunnion_sim.firmware import heat_codes, host_codes, motion_codes, replies
+from trunnion_sim.firmware import replies
 from trunnion_sim.firmware.answers import Answers
+from trunnion_sim.firmware.dispatch import dispatch
 from trunnion_sim.firmware.emergency import EmergencyParser
 from trunnion_sim.firmware.fault_plan import FaultPlan
 from trunnion_sim.firmware.faults import Fault
 from trunnion_sim.firmware.heat import TICK, Heater, bed, hotend
-from trunnion_sim.firmware.motion import LONGEST_EXTRUSION, Motion
-from trunnion_sim.firmware.parser import Command, bare, parse
+from trunnion_sim.firmware.motion import Motion
+from trunnion_sim.firmware.parser import bare
 from trunnion_sim.firmware.planner import Planner
 from trunnion_sim.firmware.reader import CHECKSUM, LineError, LineReader
 from trunnion_sim.firmware.ring import ReceiveRing
@@ -35,8 +36,6 @@ IDLE_HEATING = 50.0
 """How much faster than the outside an idle machine as fast as possible heats up."""
 EVENTS_AT_ONCE = 10000
 """Events after which a machine as fast as possible lets its caller look at the world again."""
-Handler = Callable[["SoftwareMachine", Command], Steps | None]
-CODES: dict[str, Handler] = {**motion_codes.CODES, **heat_codes.CODES, **host_codes.CODES}
 
 
 class SoftwareMachine:
@@ -283,8 +282,6 @@ class SoftwareMachine:
         self._queue: deque[bytes] = deque()
         self._handler: Steps | None = None
         self._wait = Wait()
-        planner = self.planner
-        self._space = Wait(ready=lambda: not planner.full)
         self._ok_said = False
         self._flushed = False
         self.resend_ok_after: float | None = 0.0
@@ -352,46 +349,16 @@ class SoftwareMachine:
             if delay is not None:
                 delays.append(delay)
         text = bare(line)
-        steps = self._delayed(delays, text) if delays else self._dispatch(text)
+        steps = self._delayed(delays, text) if delays else dispatch(self, text)
         if steps is None:
             self._finish()
         else:
             self._start(steps)
 
-    def _dispatch(self, text: str) -> Steps | None:
-        """Run a command; what it still waits for is returned."""
-        command = parse(text)
-        if command is None:
-            self._unknown(text)
-            return None
-        self.executed.append(text)
-        code = command.code
-        if code in ("G1", "G0"):
-            if self.dropped_moves:
-                self.dropped_moves -= 1
-                return None
-            goal = self.motion.target(command.words)
-            if self.planner.full:
-                return self._move_when_free(goal)
-            self._move(goal)
-            return None
-        handler = CODES.get(code)
-        if handler is not None:
-            return handler(self, command)
-        if code.startswith("T"):
-            host_codes.select_tool(self, command)
-            return None
-        self.executed.pop()
-        self._unknown(text)
-        return None
-
-    def _unknown(self, text: str) -> None:
-        self.say(f'echo:Unknown command: "{text}"\n')
-
     def _delayed(self, delays: list[Steps], text: str) -> Steps:
         for delay in delays:
             yield from delay
-        yield from self._dispatch(text) or ()
+        yield from dispatch(self, text) or ()
 
     def _start(self, steps: Steps) -> None:
         self._handler = steps
@@ -426,23 +393,6 @@ class SoftwareMachine:
         else:
             self._out.say(b"ok\n", self.now)
         self._queue.popleft()
-
-    def _move_when_free(self, goal: list[float]) -> Steps:
-        yield self._space
-        self._move(goal)
-
-    def _move(self, goal: list[float]) -> None:
-        motion = self.motion
-        motion.limit(goal)
-        fed = goal[-1] - motion.position[-1]
-        if fed and not self.allow_cold and self.heaters[0].reading < self.coldest_extrusion - 1.0:
-            self.say(replies.COLD_EXTRUSION)
-            self.planner.set_filament(goal[-1])
-        elif abs(fed) > LONGEST_EXTRUSION:
-            self.say(replies.LONG_EXTRUSION)
-            self.planner.set_filament(goal[-1])
-        self.planner.add(goal, motion.feed * motion.feed_factor, motion.flow_factor, len(self.executed), self.now)
-        motion.position = goal
 
     def _emergency(self, code: str, answer: int | None) -> None:
         if code == "M112":

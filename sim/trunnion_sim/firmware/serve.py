@@ -109,7 +109,7 @@ def _serve(machine: SoftwareMachine, wire: int, stop: threading.Event) -> None:
     pace = Pace(machine)
     unread = bytearray()
     while not stop.is_set() and machine.connected:
-        readable, writable, _ = select.select([wire], [wire] if unread else [], [], 0.0 if unread else pace.sleep())
+        readable, _, _ = select.select([wire], [wire] if unread else [], [], pace.sleep())
         unread += machine.advance(pace.elapsed())
         if readable:
             try:
@@ -131,8 +131,6 @@ def _serve(machine: SoftwareMachine, wire: int, stop: threading.Event) -> None:
                 except (BrokenPipeError, ConnectionResetError):
                     return
             del unread[: max(len(unread) - MOST_UNREAD, 0)]
-            if not writable:
-                stop.wait(0.0)
 
 
 def _make_link(link: Path, name: str) -> None:
