@@ -10,9 +10,10 @@ from trunnion_core.mesh import Mesh
 from trunnion_core.profile import shipped_profiles
 from trunnion_slicer.mesh_io import write_stl
 
+CUBE_FACES = ("013", "032", "467", "475", "045", "051", "237", "276", "026", "064", "157", "173")
 CUBE = Mesh(
     np.array([[x, y, z] for x in (0.0, 10) for y in (0.0, 10) for z in (0.0, 10)]),
-    np.array([[int(corner) for corner in face] for face in "013 032 467 475 045 051 237 276 026 064 157 173".split()]),
+    np.array([[int(corner) for corner in face] for face in CUBE_FACES]),
 )
 CRADLE = "generic_ab_cradle"
 
