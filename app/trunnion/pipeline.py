@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
 from trunnion_core.arrays import FloatArray
 from trunnion_core.findings import Finding
 from trunnion_core.mesh import Mesh
@@ -110,5 +111,19 @@ def write_job(job: Job, out: Path, timings: Timings | None = None) -> WriteSumma
     with timings.stage("write"):
         dx, dy, dz = (float(value) for value in job.part.shift)
         return write_program(
-            job.program, job.profile, job.settings, title=job.part.name, out=out, placement=(dx, dy, dz)
+            job.program,
+            job.profile,
+            job.settings,
+            title=job.part.name,
+            out=out,
+            placement=(dx, dy, dz),
+            layer_z=layer_tops(job.toolpath),
         )
+
+
+def layer_tops(toolpath: Toolpath) -> dict[int, float]:
+    """Highest z in mm of the beads of every layer."""
+    rows = toolpath.extrudes
+    tops = np.full(int(toolpath.layer.max(initial=-1)) + 1, -np.inf)
+    np.maximum.at(tops, toolpath.layer[rows], toolpath.points[rows, 2])
+    return {layer: top for layer, top in enumerate(tops.tolist()) if top > -np.inf}
