@@ -2,6 +2,7 @@
 
 from functools import reduce
 from operator import xor
+from typing import Any
 
 import pytest
 from trunnion_core.profile import MachineProfile, load_profile
@@ -21,8 +22,8 @@ def numbered(n: int, text: str) -> str:
 class Wire:
     """A machine whose banner has been read."""
 
-    def __init__(self, profile: MachineProfile, **options: object) -> None:
-        self.machine = SoftwareMachine(profile, **options)  # type: ignore[arg-type]
+    def __init__(self, profile: MachineProfile, **options: Any) -> None:
+        self.machine = SoftwareMachine(profile, **options)
         self.banner = self.machine.take().decode()
 
     def ask(self, text: str, seconds: float = 0.0) -> str:

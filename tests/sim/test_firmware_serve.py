@@ -2,7 +2,7 @@
 
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import reduce
 from operator import xor
@@ -35,7 +35,7 @@ def until_ok(port: EmbeddedPort) -> bytes:
 
 
 @contextmanager
-def serving(serve: object, *words: object) -> Iterator[str]:
+def serving(serve: Callable[..., None], *words: object) -> Iterator[str]:
     stop, up = threading.Event(), threading.Event()
     names: list[str] = []
 
@@ -43,7 +43,7 @@ def serving(serve: object, *words: object) -> Iterator[str]:
         names.append(name)
         up.set()
 
-    thread = threading.Thread(target=serve, args=(*words, stop), kwargs={"ready": ready})  # type: ignore[arg-type]
+    thread = threading.Thread(target=serve, args=(*words, stop), kwargs={"ready": ready})
     thread.start()
     assert up.wait(10.0)
     try:
