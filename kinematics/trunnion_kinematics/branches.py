@@ -30,7 +30,7 @@ TURNING_WEIGHT = 1e-3
 """Cost of a second of turning that costs no time: of equal ways the one that turns least."""
 
 EARLY_COST = 1e-3
-"""s a row. Over planar layers the platter keeps still and turns shortly before it must, not at the first long travel."""
+"""s a row. Over planar layers the platter keeps still and turns shortly before it must, not at the first chance."""
 
 REWIND_COST = 3.0
 """s. Retract, leave, return and prime, besides the motion itself."""
