@@ -154,7 +154,7 @@ def _collect(
     count: Counter[tuple[str, int]],
 ) -> None:
     """Keep what is not motion: counts of every command, and the words of those that matter."""
-    plain = (block.flags & kernel.NOT_A_COMMAND) == 0
+    plain = ((block.flags & kernel.NOT_A_COMMAND) == 0) & (block.code >= 0)
     index = np.flatnonzero(plain)
     key = block.letter[index].astype(np.int64) * 10_000_000 + block.code[index]
     values, first, inverse, counts = np.unique(key, return_index=True, return_inverse=True, return_counts=True)

@@ -12,7 +12,7 @@ CODES = {
     "bead-in-air": ("error", "A whole bead has nothing below it and nothing beside it."),
     "long-bridge": ("warning", "A long stretch of a bead hangs in the air."),
     "bead-over-bead": ("error", "A bead is laid where there is a bead already."),
-    "crowded-bead": ("warning", "A bead has less than two thirds of the room that its plastic needs."),
+    "crowded-bead": ("warning", "A bead has less than half the room that it was meant for."),
     "travel-through-print": ("error", "The tip travels through what is printed."),
 }
 
@@ -22,8 +22,8 @@ BRIDGE = 20.0
 """mm that ordinary filament bridges with ease."""
 LONGEST_DOUBLE = 5.0
 """mm: seams and corners overlap themselves for shorter stretches."""
-OVER, CROWDED = 0.6, 0.35
-"""Share of a bead's plastic that found other plastic in its place."""
+OVER, CROWDED = 0.6, 0.5
+"""Share of a bead's plastic, or of the gap it was meant for, that is taken by other plastic."""
 DIP = 0.4
 """Of a layer height: how far a travel may dip into the round top of a bead that stands a little proud."""
 
@@ -58,10 +58,13 @@ def check(context: Context) -> Iterator[Finding]:
     )
     volume = context.motion.filament * context.profile.filament_area
     share = np.divide(deposit.crowded, volume, out=np.zeros(len(volume)), where=context.feeds & (deposit.laid > 0))
+    meant = np.where(context.rows.height > 0, context.rows.height, context.layer_height)
+    missing = np.clip(1 - np.where(deposit.laid > 0, deposit.gap, meant) / meant, 0.0, 1.0)
+    share = np.where(context.feeds, np.maximum(share, missing), 0.0)
     double = _run_length(share > OVER, deposit.laid) > LONGEST_DOUBLE
 
     def message(row: int) -> str:
-        return f"{min(share[row], 1):.0%} of the bead's plastic finds other plastic in its place"
+        return f"{min(share[row], 1):.0%} of the bead finds its place taken"
 
     yield from context.find("bead-over-bead", "error", double, message, value=share, limit=OVER)
     crowded = (_run_length(share > CROWDED, deposit.laid) > SHORTEST) & ~double

@@ -44,7 +44,7 @@ def check(context: Context) -> Iterator[Finding]:
             joint=joint,
         )
     corner = profile.array("corner_speed") * profile.to_shown * (1 + SLACK)
-    raised = (context.limits.corner[:, :-1] > corner).any(axis=1)[context.limits.which]
+    raised = np.asarray((context.limits.corner[:, :-1] > corner).any(axis=1))[context.limits.which]
     yield from context.find(
         "corner-raised",
         "warning",

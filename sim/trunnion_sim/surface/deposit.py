@@ -2,7 +2,7 @@ r"""Lay every bead of a program down in order, on what is there, and keep the su
 
 **The bead.** Its section has the area `A` = plastic fed / way of the tip, whatever width the program's comments name.
 Its upper side is the surface that the flat of the nozzle sweeps: the tip's path, level across it at right angles to the
-tool. It reaches down to what lies below (the bed, other beads), at a gap `h` measured under the bore, and sideways as
+tool. It reaches down to what lies below (the bed, other beads), at a gap `h` measured under it, and sideways as
 far as the area needs: the section is a stadium of height h and width (A - pi/4 h²) / h + h (the flow model of Slic3r,
 https://manual.slic3r.org/advanced/flow-math), with round edges of radius h/2 that nothing fills up later. Where
 the gap opens sideways, the bead ends where its area is spent.
@@ -26,6 +26,7 @@ volume is kept); what a nozzle not at right angles to its path wipes away; surfa
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +37,10 @@ from trunnion_sim.surface import deposit_kernel
 
 MOST_CELLS = 24_000_000
 """Cells of the height field; beyond that it is made coarser."""
+
+
+Ground = Callable[[FloatArray, FloatArray], FloatArray]
+"""Heights in mm over X and Y."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +86,7 @@ class Deposit:
 
     field: Field
     gap: FloatArray
-    """mm under the bore, where no neighbour reaches in, mean along the row; NaN where no bead was laid in the field."""
+    """mm under the bead, where no neighbour reaches in, mean along the row; NaN where no bead was laid in the field."""
     laid: FloatArray
     """mm of bead laid inside the field."""
     unsupported: FloatArray
@@ -97,16 +102,25 @@ class Deposit:
 
 
 def lay_down(
-    pieces: Pieces, rows: int, low: FloatArray, high: FloatArray, cell: float, flat_diameter: float
+    pieces: Pieces,
+    rows: int,
+    low: FloatArray,
+    high: FloatArray,
+    cell: float,
+    flat_diameter: float,
+    ground: Ground | None = None,
 ) -> Deposit:
     """Execute the pieces over the rectangle `low` to `high` (mm, X and Y) with cells of `cell` mm.
 
-    Cells grow where the rectangle would need more than MOST_CELLS. About a million steps of 2 cells a second.
+    `ground` gives what stands there before the first bead; by default the bed at 0. Cells grow where the rectangle
+    would need more than MOST_CELLS. About a million steps of 2 cells a second.
     """
     size = np.maximum(high - low, cell)
     cell = max(cell, math.sqrt(float(size[0] * size[1]) / MOST_CELLS))
     nx, ny = (math.ceil(float(extent) / cell) + 1 for extent in size)
     top = np.zeros((ny, nx), np.float32)
+    if ground is not None:
+        top += ground(low[0] + cell * np.arange(nx)[None, :], low[1] + cell * np.arange(ny)[:, None]).astype(np.float32)
     stats = np.zeros((rows, 6))
     depth_point = np.full((rows, 3), np.nan)
     deposit_kernel.run(

@@ -21,7 +21,7 @@ WIDEN = 1.25
 SEAM = 1e-6
 """mm by which slabs overlap, so that rounding leaves no cell between them."""
 BLOCKED = 0.75
-"""Where the gap under the bore is smaller than this share of what it is elsewhere, a neighbour stands."""
+"""Where the gap under a bead is smaller than this share of what it is elsewhere, a neighbour stands."""
 ASIDE = 0.5
 """Share of the plastic without room that goes to the free side; the rest rises behind the nozzle."""
 REACH = 1.5
@@ -172,25 +172,26 @@ def _section(
 ) -> None:
     """The bead's section at point c.
 
-    result: 0 left and 1 right half width, 2 height of the section, 3 gap under the bore, 4 whether unsupported,
+    result: 0 left and 1 right half width, 2 height of the section, 3 gap below it, 4 whether unsupported,
     5 crowded and 6 bulged area, 7 how far the section's upper side lies above the path (negative: below).
     """
     ny, nx = top.shape
     thread = math.sqrt(4 * area / math.pi)
-    # under the bore
-    under = np.empty(5)
-    for k in range(5):
-        u = (k - 2) * 0.1 * flat
+    # the gap below
+    under = np.empty(9)
+    for k in range(9):
+        u = (k - 4) * 0.1 * flat
         under[k] = c[2] + u * b[2] - _read(top, before, stamp, x0, y0, cell, c[0] + u * b[0], c[1] + u * b[1], since)
-    typical = np.sort(under)[3]
+    typical = np.sort(under)[6]
     clear = min(typical, BLOCKED * typical)
     gap = 0.0
     count = 0
-    for k in range(5):
-        if under[k] >= clear:
+    for k in range(9):
+        # what stands beside a neighbour was read between it and the open
+        if min(under[k], under[max(k - 1, 0)], under[min(k + 1, 8)]) >= clear:
             gap += under[k] * normal_z
             count += 1
-    gap /= count
+    gap = gap / count if count else typical * normal_z
     shift = 0.0
     if gap > thread:
         height = thread
@@ -226,7 +227,10 @@ def _section(
             # where the gap opens sideways, the plastic is used up sooner: the bead ends where its area is spent
             deep = min(max(g, 0.0), max(height, thread))
             filled += deep * du_side
-            if u < wide[side] and filled - (1 - math.pi / 4) * deep**2 / 2 > area / 2 + height * cell / 8:
+            if (
+                u < wide[side]
+                and filled - (1 - math.pi / 4) * max(deep, height) ** 2 / 2 > area / 2 + height * cell / 8
+            ):
                 wide[side] = u
             if u > 0.5 * half and g < 0.6 * height:
                 contact = True
