@@ -120,7 +120,7 @@ MUTATIONS: dict[str, list[str]] = {
         f"G1 X40 Z0.9 E{PER_MM * 38:.5f} F2400",
     ),
     "bead-over-bead": with_line(FIRST + 1, f"G1 X0 {BEAD} F2400", f"G1 X8 {BEAD} F2400"),
-    "crowded-bead": everywhere(f"Y{WIDTH / 2 + PITCH:.4f}", f"Y{WIDTH / 2 + 0.14 * PITCH:.4f}"),
+    "crowded-bead": everywhere(f"Y{WIDTH / 2 + PITCH:.4f}", f"Y{WIDTH / 2 + 0.35 * PITCH:.4f}"),
     "travel-through-print": with_text(GOOD.index("G0 Z30 F2000"), "Z30", "X0 Y0 Z0.5"),
     "torn-file": [*GOOD[:-3], "G0 Z3"],
     "no-final-newline": GOOD,

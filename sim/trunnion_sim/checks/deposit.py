@@ -23,7 +23,7 @@ BRIDGE = 20.0
 LONGEST_DOUBLE = 5.0
 """mm: seams and corners overlap themselves for shorter stretches."""
 OVER, CROWDED = 0.6, 0.5
-"""Share of a bead's plastic, or of the gap it was meant for, that is taken by other plastic."""
+"""Share of a bead's plastic that finds no room, or of its place that is taken."""
 DIP = 0.4
 """Of a layer height: how far a travel may dip into the round top of a bead that stands a little proud."""
 
@@ -58,9 +58,7 @@ def check(context: Context) -> Iterator[Finding]:
     )
     volume = context.motion.filament * context.profile.filament_area
     share = np.divide(deposit.crowded, volume, out=np.zeros(len(volume)), where=context.feeds & (deposit.laid > 0))
-    meant = np.where(context.rows.height > 0, context.rows.height, context.layer_height)
-    missing = np.clip(1 - np.where(deposit.laid > 0, deposit.gap, meant) / meant, 0.0, 1.0)
-    share = np.where(context.feeds, np.maximum(share, missing), 0.0)
+    share = np.where(context.feeds, np.maximum(share, deposit.taken), 0.0)
     double = _run_length(share > OVER, deposit.laid) > LONGEST_DOUBLE
 
     def message(row: int) -> str:

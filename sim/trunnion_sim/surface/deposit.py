@@ -99,6 +99,8 @@ class Deposit:
     """mm that the tip dips below the surface of what is printed, at worst, on a travel."""
     depth_point: FloatArray
     """(n, 3) mm: where."""
+    taken: FloatArray
+    """Share of the bead's place, across and along, that other plastic holds up to the nozzle."""
 
 
 def lay_down(
@@ -121,7 +123,7 @@ def lay_down(
     top = np.zeros((ny, nx), np.float32)
     if ground is not None:
         top += ground(low[0] + cell * np.arange(nx)[None, :], low[1] + cell * np.arange(ny)[:, None]).astype(np.float32)
-    stats = np.zeros((rows, 6))
+    stats = np.zeros((rows, 7))
     depth_point = np.full((rows, 3), np.nan)
     deposit_kernel.run(
         top,
@@ -148,4 +150,5 @@ def lay_down(
         bulged=stats[:, 4],
         depth=stats[:, 5],
         depth_point=depth_point,
+        taken=np.divide(stats[:, 6], laid, out=np.zeros(rows), where=laid > 0),
     )

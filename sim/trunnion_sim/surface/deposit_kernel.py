@@ -24,6 +24,8 @@ BLOCKED = 0.75
 """Where the gap under a bead is smaller than this share of what it is elsewhere, a neighbour stands."""
 ASIDE = 0.5
 """Share of the plastic without room that goes to the free side; the rest rises behind the nozzle."""
+TAKEN = 0.35
+"""In thread diameters: a gap so small that the place counts as taken."""
 REACH = 1.5
 """In thread diameters: gap up to which a thread falls onto what is below."""
 
@@ -44,7 +46,10 @@ def run(
     stats: _F,
     depth_point: _F,
 ) -> None:
-    """Execute every piece; fills top, stats (gap x length, length, unsupported, crowded, bulged, depth) and points."""
+    """Execute every piece.
+
+    Fills top, depth_point, and of stats: gap x length, length, unsupported, crowded, bulged, depth, taken x length.
+    """
     ny, nx = top.shape
     before = np.zeros((ny, nx), np.float32)
     stamp = np.full((ny, nx), -1e30)
@@ -52,7 +57,7 @@ def run(
     way = 0.0
     last_t = np.zeros(3)
     last_end = np.full(3, np.nan)
-    result = np.zeros(8)
+    result = np.zeros(9)
     x1, y1 = x0 + (nx - 1) * cell, y0 + (ny - 1) * cell
     for m in range(len(rows)):
         if not present[m]:
@@ -105,6 +110,7 @@ def run(
             stats[row, 2] += result[4] * step
             stats[row, 3] += result[5] * step
             stats[row, 4] += result[6] * step
+            stats[row, 6] += result[8] * step
             if s == 0 and turned:
                 _draw(top, before, stamp, pores, x0, y0, cell, p, t, b, normal_z, 0.0, True, result, here, own)
             _draw(top, before, stamp, pores, x0, y0, cell, c, t, b, normal_z, step / 2, False, result, here, own)
@@ -173,7 +179,8 @@ def _section(
     """The bead's section at point c.
 
     result: 0 left and 1 right half width, 2 height of the section, 3 gap below it, 4 whether unsupported,
-    5 crowded and 6 bulged area, 7 how far the section's upper side lies above the path (negative: below).
+    5 crowded and 6 bulged area, 7 how far the section's upper side lies above the path (negative: below), 8 share of
+    the way across that is taken.
     """
     ny, nx = top.shape
     thread = math.sqrt(4 * area / math.pi)
@@ -186,7 +193,10 @@ def _section(
     clear = min(typical, BLOCKED * typical)
     gap = 0.0
     count = 0
+    result[8] = 0.0
     for k in range(9):
+        if under[k] * normal_z < TAKEN * thread:
+            result[8] += 1 / 9
         # what stands beside a neighbour was read between it and the open
         if min(under[k], under[max(k - 1, 0)], under[min(k + 1, 8)]) >= clear:
             gap += under[k] * normal_z
