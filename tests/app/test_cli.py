@@ -1,5 +1,6 @@
 """The command line: quick, clear, and leaving nothing half-written."""
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -88,3 +89,80 @@ def test_inverse_refuses_bad_arrays_in_one_sentence(tmp_path, arrays, said):
     assert said in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["in.npz"]
+
+
+def running_sim(*words: str | Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "trunnion", "sim", "-m", "generic_ab_cradle", *map(str, words)]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.mark.parametrize("wire", ["pty", "tcp"])
+def test_one_process_prints_through_the_wire_on_another(tmp_path, wire):
+    program = tmp_path / "square.gcode"
+    program.write_text("G28\nG1 X10 Y0 Z5 A0 B0 F3000\n" + "G1 X10 Y10 F1200\nG1 X0 Y10\nG1 X0 Y0\nG1 X10 Y0\n" * 50)
+    link = tmp_path / "printer"
+    sim = (
+        running_sim("--pty", link, "--fault", "flip-up:p=0.002")
+        if wire == "pty"
+        else running_sim("--tcp", "127.0.0.1:0")
+    )
+    try:
+        assert sim.stderr is not None
+        place = sim.stderr.readline().removeprefix("listening on ").strip()
+        port = link if wire == "pty" else f"tcp://{place}"
+        done = trunnion("print", program, "-m", "generic_ab_cradle", "--port", port)
+    finally:
+        sim.terminate()
+        sim.communicate(timeout=30)
+    assert done.returncode == 0, done.stderr
+    assert "202 lines executed" in done.stdout
+    assert not link.is_symlink()
+
+
+def test_printing_to_no_printer_is_one_sentence(tmp_path):
+    program = tmp_path / "a.gcode"
+    program.write_text("G28\n")
+    done = trunnion("print", program, "-m", "generic_ab_cradle", "--port", tmp_path / "nothing")
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert "nothing" in done.stderr
+
+
+def test_a_wrong_fault_and_a_wrong_factor_are_misuse(tmp_path):
+    for words in (["--fault", "gremlins"], ["--speed", "-1"]):
+        done = trunnion("sim", "-m", "generic_ab_cradle", "--pty", tmp_path / "p", *words)
+        assert done.returncode == 2
+        assert words[1] in done.stderr
+
+
+def test_ctrl_c_stops_the_print_cleanly_and_says_so(tmp_path):
+    """The machine runs in real time and moves for minutes; the interrupt comes when the first lines are on their way."""
+    program = tmp_path / "long.gcode"
+    program.write_text("G92 X0 Y0 Z0 A0 B0\n" + "G1 X50 F600\nG1 X0\n" * 200)
+    link = tmp_path / "printer"
+    sim = running_sim("--pty", link, "--speed", "50")
+    try:
+        assert sim.stderr is not None
+        sim.stderr.readline()
+        command = [
+            sys.executable,
+            "-m",
+            "trunnion",
+            "print",
+            str(program),
+            "-m",
+            "generic_ab_cradle",
+            "--port",
+            str(link),
+        ]
+        host = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        with pytest.raises(subprocess.TimeoutExpired):
+            host.communicate(timeout=5)
+        host.send_signal(signal.SIGINT)
+        _, said = host.communicate(timeout=60)
+    finally:
+        sim.terminate()
+        sim.communicate(timeout=30)
+    assert host.returncode == 1
+    assert "stopped after" in said
+    assert "Traceback" not in said

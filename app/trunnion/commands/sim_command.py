@@ -32,14 +32,12 @@ def command(machine: str, pty: Path | None, tcp: str | None, speed: str, faults:
     stop = threading.Event()
     try:
         if pty is not None:
-            click.echo(f"listening on {pty}", err=True)
-            serve_pty(software, pty, stop)
+            serve_pty(software, pty, stop, ready=_say_where)
         elif tcp is not None:
             host, _, port = tcp.rpartition(":")
             if not host or not port.isdigit() or not 0 <= int(port) < 65536:
                 raise click.BadParameter(f"'{tcp}' should be HOST:PORT, as in 127.0.0.1:4000", param_hint="--tcp")
-            click.echo(f"listening on {host}:{port}", err=True)
-            serve_tcp(software, host, int(port), stop)
+            serve_tcp(software, host, int(port), stop, ready=_say_where)
     finally:
         stop.set()
 
@@ -54,3 +52,7 @@ def _factor(text: str) -> float | None:
     if not 0.1 <= factor <= 1e6:
         raise click.BadParameter(f"'{text}' should be a factor of at least 0.1, or max", param_hint="--speed")
     return factor
+
+
+def _say_where(place: str) -> None:
+    click.echo(f"listening on {place}", err=True)
