@@ -47,8 +47,8 @@ class MachineProgram:
     """(n,) row of the toolpath whose motion this is a part of; -1 for what motion inserted."""
     events: tuple[Event, ...] = field(default=())
     cruise: FloatArray = field(default_factory=lambda: np.zeros(0))
-    """(n,) s that the row would take at the highest speed it reaches, for a firmware that makes its own ramps: feed
-    words come from this, the time of the print from `duration`. Empty where nobody worked it out."""
+    """(n,) s that the row would take at the speed asked of a firmware that makes its own ramps: feed words come from
+    this, the time of the print from `duration`. Empty where nobody worked it out."""
 
     def __post_init__(self) -> None:
         n, k = self.joints.shape

@@ -14,6 +14,7 @@ from trunnion_core.profile import MachineProfile
 from trunnion_core.validation import nearest
 
 from trunnion_gcode import dialects
+from trunnion_gcode.planner import Planner
 
 Metric = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 """(n, 3) mm of the linear words, (n, r) degrees of the rotary words, (n,) mm of filament -> (n,) length that F is
@@ -26,6 +27,7 @@ class Dialect:
 
     name: str
     metric: Metric
+    planner: Planner
     inverse_time: bool = False
     """G93: F is one over the minutes that the move takes, and stands on every move."""
     relative_extrusion: bool = True

@@ -19,14 +19,14 @@ def feed_words(moves: Moves, dialect: Dialect) -> list[str]:
     if not len(moves.row):
         return []
     measured = moves.metric > 0
-    timeless = np.flatnonzero(measured & ~(moves.seconds > 0))
+    timeless = np.flatnonzero(measured & ~(moves.asked > 0))
     if timeless.size:
         row = int(moves.row[timeless[0]])
         raise GcodeError(f"row {row}: moves {moves.metric[timeless[0]]:g} in no time, should take some")
     if dialect.inverse_time:
-        text, _ = significant("F", 60.0 / np.where(moves.seconds > 0, moves.seconds, 1.0))
+        text, _ = significant("F", 60.0 / np.where(moves.asked > 0, moves.asked, 1.0))
         return [f"F{word}" for word in text]
-    wanted = np.where(measured, 60.0 * moves.metric / np.where(measured, moves.seconds, 1.0), 1.0)
+    wanted = np.where(measured, 60.0 * moves.metric / np.where(measured, moves.asked, 1.0), 1.0)
     text, read_back = significant("F", wanted)
     return _only_changes(text, wanted.tolist(), read_back.tolist(), measured.tolist())
 
@@ -34,7 +34,7 @@ def feed_words(moves: Moves, dialect: Dialect) -> list[str]:
 def slowest(moves: Moves) -> float:
     """The lowest speed along the metric that the moves ask for, in units a second; inf without moves."""
     measured = moves.metric > 0
-    return float(np.min(moves.metric[measured] / moves.seconds[measured], initial=np.inf))
+    return float(np.min(moves.metric[measured] / moves.asked[measured], initial=np.inf))
 
 
 def _only_changes(text: list[str], wanted: list[float], read_back: list[float], measured: list[bool]) -> list[str]:

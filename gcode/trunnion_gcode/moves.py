@@ -37,6 +37,8 @@ class Moves:
     """(m,) mm."""
     seconds: FloatArray
     """(m,) planned."""
+    asked: FloatArray
+    """(m,) s that F asks for: those at the speed that the firmware ramps up to."""
     metric: FloatArray
     """(m,) length over which the firmware reads F."""
     width: FloatArray
@@ -99,7 +101,7 @@ def _merge_once(
         return False
     length = moves.metric
     steps_per_shown = np.array([joint.steps_per_unit for joint in profile.joints]) / profile.to_shown
-    few_steps = (np.abs(moves.step) * steps_per_shown < dialect.minimum_steps).all(axis=1)
+    few_steps = (np.abs(moves.step) < dialect.minimum_steps / steps_per_shown).all(axis=1)
     moving = (moves.step != 0).any(axis=1)
     short = moving & ((length < dialect.shortest) | few_steps)
     here, there = rows[:-1], rows[1:]
@@ -161,6 +163,7 @@ def _measured(
     filament_ticks[feeding] = carried_ticks(dialect.extruder, fed, profile.gcode.decimals_extruder)
     filament = from_ticks(filament_ticks, profile.gcode.decimals_extruder)
     rotary = np.array([joint.rotary for joint in profile.joints])
+    asked = program.cruise if program.cruise.size else program.duration
     return Moves(
         row=rows,
         joint_ticks=joint_ticks,
@@ -168,6 +171,7 @@ def _measured(
         filament_ticks=filament_ticks,
         filament=filament,
         seconds=np.diff(np.cumsum(program.duration)[rows], prepend=0.0),
+        asked=np.diff(np.cumsum(asked)[rows], prepend=0.0),
         metric=dialect.metric(step[:, ~rotary], step[:, rotary], filament),
         width=_mean_over_merged(program.width, program.tip_length, rows),
         height=_mean_over_merged(program.height, program.tip_length, rows),

@@ -16,17 +16,19 @@ from trunnion_core.program import MachineProgram
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
+from trunnion_gcode.dialect import find_dialect
 from trunnion_kinematics.branches import PathChoice, choose
 from trunnion_kinematics.chain import JointChain
 
 from trunnion_motion.events import events_for
+from trunnion_motion.executed import executed
 from trunnion_motion.flow import filament_per_row, share
 from trunnion_motion.flow_window import flow_findings, tip_window
 from trunnion_motion.hop import Machine
 from trunnion_motion.path import assemble
 from trunnion_motion.retraction import with_retractions
 from trunnion_motion.rows import Rows
-from trunnion_motion.timelaw import TimeLaw, time_law
+from trunnion_motion.timelaw import STILL_TIP, TimeLaw, time_law
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +73,11 @@ def plan_motion(toolpath: Toolpath, profile: MachineProfile, settings: PrintSett
         rows = replace(rows, tip_speed=np.minimum(rows.tip_speed, fastest))
 
     tip_length = rows.tip_lengths(chain.forward(home[None])[0][0])
-    law = _timed(rows, tip_length, profile, settings, home)
+    asked, ideal = _timed(rows, tip_length, profile, settings, home)
     program = MachineProgram(
         start=home,
         joints=rows.joints,
-        duration=law.duration,
+        duration=asked,
         filament=rows.filament,
         role=rows.role,
         layer=rows.layer,
@@ -85,8 +87,11 @@ def plan_motion(toolpath: Toolpath, profile: MachineProfile, settings: PrintSett
         tip_length=tip_length,
         source=rows.source,
         events=events_for(rows.layer, profile, settings),
-        cruise=law.cruise,
+        cruise=asked,
     )
+    done = executed(program, ideal, profile, find_dialect(profile.firmware, profile.file))
+    law = done.law
+    program = replace(program, duration=law.duration, cruise=done.asked)
     findings = (*findings, *flow_findings(program, law, rows.points, profile))
     return PlanResult(program, findings, rows.points, rows.tool_axes, law)
 
@@ -114,7 +119,8 @@ def _chosen(
 
 def _timed(
     rows: Rows, tip_length: FloatArray, profile: MachineProfile, settings: PrintSettings, home: FloatArray
-) -> TimeLaw:
+) -> tuple[FloatArray, TimeLaw]:
+    """(n,) s that each row takes at the wanted speed or what its joints can go, and what the machine could do."""
     extruder, planner = profile.extruder, profile.planner
     wanted = np.where(rows.tip_speed > 0, rows.tip_speed, np.inf)
     filament_only = (rows.role == Role.RETRACT) | (rows.role == Role.PRIME)
@@ -123,17 +129,22 @@ def _timed(
     wanted = np.where(still, np.inf, wanted)
     printing = np.inf if planner.acceleration is None else planner.acceleration
     travelling = printing if planner.travel_acceleration is None else planner.travel_acceleration
-    return time_law(
-        rows.steps(home),
+    steps = rows.steps(home)
+    speed = np.append(profile.array("speed"), extruder.speed)
+    slowest_joint = (np.abs(steps) / speed).max(axis=1)
+    asked = np.maximum(slowest_joint, np.where(tip_length > STILL_TIP, tip_length, slowest_joint) / wanted)
+    ideal = time_law(
+        steps,
         tip_length,
         wanted,
-        np.append(profile.array("speed"), extruder.speed),
+        speed,
         np.append(profile.array("acceleration"), extruder.acceleration),
         np.append(profile.array("corner_speed"), extruder.corner_speed),
         path_acceleration=np.where(rows.width > 0, printing, travelling),
         linear=np.array([not joint.rotary for joint in profile.joints] + [False]),
         junction_deviation=planner.junction_deviation or 0.0,
     )
+    return asked, ideal
 
 
 def _no_rows(k: int) -> Rows:

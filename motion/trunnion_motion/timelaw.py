@@ -48,11 +48,6 @@ class TimeLaw:
     """(n,) column of the joint that sets `steady` (columns as given), or BY_WISH."""
 
     @property
-    def cruise(self) -> FloatArray:
-        """(n,) s that each row would take at its peak speed."""
-        return np.where(self.peak > 0, self.length / np.where(self.peak > 0, self.peak, 1.0), 0.0)
-
-    @property
     def total(self) -> float:
         """s in all."""
         return float(self.duration.sum())

@@ -136,7 +136,9 @@ def test_retractions_bracket_the_travels(profile, dome, settings):
     expected = settings.retract_length / speed + speed / acceleration
     triangle = 2 * np.sqrt(settings.retract_length / acceleration)
     wanted = expected if settings.retract_length > speed**2 / acceleration else triangle
-    assert_allclose(program.duration[retracts], wanted)
+    assert_allclose(program.cruise[retracts], settings.retract_length / speed)
+    assert (program.duration[retracts] <= wanted * (1 + 1e-9)).all()  # Marlin starts with the extruder's corner speed
+    assert (program.duration[retracts] >= settings.retract_length / speed).all()
 
 
 def test_links_are_not_retracted(machines, dome, settings):

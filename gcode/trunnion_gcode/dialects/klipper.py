@@ -10,6 +10,7 @@ from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
 
 from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.planner import Planner
 
 STANDSTILL = 1e-9
 """mm. Klipper calls a move with less of X, Y and Z "not kinematic"."""
@@ -31,4 +32,12 @@ def setup(profile: MachineProfile) -> tuple[str, ...]:
     )
 
 
-DIALECT = Dialect(name="klipper", metric=metric, pause="PAUSE", checksums=False, max_line=4096, setup=setup)
+DIALECT = Dialect(
+    name="klipper",
+    metric=metric,
+    planner=Planner("klipper"),
+    pause="PAUSE",
+    checksums=False,
+    max_line=4096,
+    setup=setup,
+)

@@ -7,10 +7,12 @@ travels are G1 as well. With G93 every move carries F, one over its minutes.
 
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.metrics import linear_first
+from trunnion_gcode.planner import Planner
 
 DIALECT = Dialect(
     name="linuxcnc",
     metric=linear_first,
+    planner=Planner("blend"),
     inverse_time=True,
     relative_extrusion=False,
     extruder="U",

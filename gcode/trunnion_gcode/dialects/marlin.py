@@ -9,6 +9,7 @@ import functools
 
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.metrics import linear_first
+from trunnion_gcode.planner import Planner
 
 SHORTEST_LINEAR = 1e-3
 """mm: the square root of Marlin's UNEAR_ZERO."""
@@ -16,6 +17,7 @@ SHORTEST_LINEAR = 1e-3
 DIALECT = Dialect(
     name="marlin",
     metric=functools.partial(linear_first, threshold=SHORTEST_LINEAR),
+    planner=Planner("marlin", blocks=2, slowest=0.05, starts_at_corner_speed=True),
     shortest=2 * SHORTEST_LINEAR,
     minimum_steps=6,
 )

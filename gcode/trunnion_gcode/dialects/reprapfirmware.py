@@ -6,10 +6,12 @@ the speed to the machine's minimum (30 mm/min unless M203 I says otherwise).
 
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.metrics import linear_first
+from trunnion_gcode.planner import Planner
 
 DIALECT = Dialect(
     name="reprapfirmware",
     metric=linear_first,
+    planner=Planner("reprapfirmware", blocks=40, stops_between_kinds=True),
     pause="M226",
     max_line=200,
     shortest=2e-3,

@@ -1,0 +1,28 @@
+"""How a firmware's planner turns words into motion, as a value: what the plan must follow to be what happens."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Corners = Literal["marlin", "reprapfirmware", "klipper", "grbl", "blend"]
+"""Rule for the speed at a corner.
+
+marlin: classic jerk, or junction deviation where the profile gives one. reprapfirmware: no axis jumps by more than its
+corner speed. klipper: junction deviation over X, Y and Z from a square corner velocity, extra axes by their own corner
+speed, cruising held back where it would be short. grbl: junction deviation over all axes. blend: every move starts to
+ramp up while the one before it ramps down, so neither may be faster than its own length lets it be.
+"""
+
+
+@dataclass(frozen=True)
+class Planner:
+    """What one firmware's planner does with moves, beyond the limits of the profile."""
+
+    corners: Corners
+    blocks: int | None = None
+    """Moves that it looks ahead, at least; None where it sees all of them."""
+    slowest: float = 0.0
+    """Units/s; slower moves are sped up to this."""
+    starts_at_corner_speed: bool = False
+    """Whether a move from rest starts with the corner speed at once instead of from zero."""
+    stops_between_kinds: bool = False
+    """Whether it stops where printing turns into travelling and back."""

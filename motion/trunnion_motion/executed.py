@@ -1,0 +1,187 @@
+"""Turn a program into the time law that its firmware will make of the words: planned time is executed time.
+
+`time_law` says what the machine could do; its steady speeds become F. The firmware then reads rounded words, measures
+each move by its own length, and makes its own ramps and corners with its own look-ahead. This is that planner, so that
+the rows' durations are those of the print.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.profile import MachineProfile
+from trunnion_core.program import MachineProgram
+from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.moves import Moves, make_moves
+
+from trunnion_motion import executed_kernel as kernel
+from trunnion_motion.timelaw import TimeLaw
+
+UNLIMITED = 1e12
+"""Stands for an acceleration without a limit, in units/s²."""
+DEFAULT_DEVIATION = 0.01
+"""mm. What GRBL is shipped with ($11)."""
+BENDS = 2
+"""Passes over the corners of curves: slower moves make slower corners."""
+
+
+@dataclass(frozen=True, eq=False)
+class Execution:
+    """The law of the rows, and what F has to ask for."""
+
+    law: TimeLaw
+    asked: FloatArray
+    """(n,) s that the row would take at the speed that its F asks for."""
+
+
+def executed(program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, dialect: Dialect) -> Execution:
+    """The law of the same rows under the firmware's rules.
+
+    `program.cruise` (n,) s is what each row takes at the speed that is wanted and that its joints can go. F asks for
+    that, or for less where a row of small corners would bend a joint too fast. Rows that are written as one move
+    share its ramps; rows that are not written at all, since no word changes, take no time.
+    """
+    moves = make_moves(program, profile, dialect)
+    if not len(moves.row):
+        return Execution(ideal, program.cruise)
+    drive = _drive(moves, program, profile, dialect)
+    nominal = drive.nominal
+    for _ in range(BENDS):
+        corner, _rest = drive.corners(nominal)
+        nominal = kernel.bent(drive.share, nominal, moves.metric, corner, drive.acceleration)
+    corner, rest = drive.corners(nominal)
+    blocks = len(nominal) + 1 if dialect.planner.blocks is None else max(dialect.planner.blocks, profile.planner.blocks)
+    stops = _stops(moves, program)
+    entry, peak, leave = kernel.ramps(moves.metric, nominal, drive.ramp, corner, rest, stops, blocks)
+    return _per_row(program, ideal, moves, _Trapezoids(entry, peak, leave, drive.ramp, nominal))
+
+
+@dataclass(frozen=True, eq=False)
+class _Drive:
+    """Moves as the planner sees them, along its own length: mm, degrees, or mm of filament."""
+
+    dialect: Dialect
+    length: FloatArray
+    """(m,)."""
+    share: FloatArray
+    """(m, k + 1) that every joint and the filament move per unit of length."""
+    kind: IntArray
+    """(m,) 1 where joints move, 2 where linear ones do, 4 where filament moves, added up."""
+    nominal: FloatArray
+    """(m,) units/s wanted."""
+    ramp: FloatArray
+    """(m,) units/s²."""
+    acceleration: FloatArray
+    """(k + 1,)."""
+    corner_speed: FloatArray
+    """(k + 1,)."""
+    deviation: float | None
+    """mm of junction deviation, where the profile gives one."""
+
+    def corners(self, nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(m,) speed allowed into every move from the one before, and (m,) from rest."""
+        rules = self.dialect.planner
+        rest = np.minimum(nominal, rules.slowest)
+        if rules.corners == "reprapfirmware":
+            return kernel.jump_corners(self.share, nominal, self.kind, self.corner_speed), np.zeros(len(nominal))
+        if rules.corners == "grbl" or self.deviation is not None:
+            across = DEFAULT_DEVIATION if self.deviation is None else self.deviation
+            like_marlin = rules.corners == "marlin"
+            corner = kernel.deviation_corners(
+                self.share, nominal, self.length, self.ramp, self.acceleration, across, like_marlin
+            )
+            return corner, rest
+        return kernel.jerk_corners(self.share, nominal, self.corner_speed)
+
+
+def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> _Drive:
+    extruder, planner = profile.extruder, profile.planner
+    steps = np.column_stack([moves.step, moves.filament])
+    share = steps / moves.metric[:, None]
+    speed = np.append(profile.array("speed") * profile.to_shown, extruder.speed)
+    acceleration = np.append(profile.array("acceleration") * profile.to_shown, extruder.acceleration)
+    printing = UNLIMITED if planner.acceleration is None else planner.acceleration
+    travelling = printing if planner.travel_acceleration is None else planner.travel_acceleration
+    kind = _kinds(moves, profile)
+    along = np.where(kind & 1, np.where(moves.filament > 0, printing, travelling), UNLIMITED)
+    with np.errstate(divide="ignore"):
+        reach, push = (speed / np.abs(share)).min(axis=1), (acceleration / np.abs(share)).min(axis=1)
+    return _Drive(
+        dialect=dialect,
+        length=moves.metric,
+        share=share,
+        kind=kind,
+        nominal=np.minimum(np.maximum(moves.metric / moves.asked, dialect.planner.slowest), reach),
+        ramp=np.minimum(along, push),
+        acceleration=acceleration,
+        corner_speed=np.append(profile.array("corner_speed") * profile.to_shown, extruder.corner_speed),
+        deviation=planner.junction_deviation,
+    )
+
+
+def _kinds(moves: Moves, profile: MachineProfile) -> IntArray:
+    """(m,) 1 where joints move, 2 where linear ones do, 4 where filament moves, added up."""
+    linear = np.array([not joint.rotary for joint in profile.joints])
+    joints = (moves.step != 0).any(axis=1)
+    straight = (moves.step[:, linear] != 0).any(axis=1)
+    return np.asarray(joints + 2 * straight + 4 * (moves.filament != 0))
+
+
+def _stops(moves: Moves, program: MachineProgram) -> BoolArray:
+    """(m,) whether the machine stands before the move: at the start, and while it waits."""
+    stops = np.zeros(len(moves.row), dtype=np.bool_)
+    stops[0] = True
+    waits = [event.row for event in program.events if event.kind in ("wait_nozzle", "wait_bed", "pause")]
+    at = np.searchsorted(moves.row, waits)
+    stops[at[at < len(stops)]] = True
+    return stops
+
+
+@dataclass(frozen=True, eq=False)
+class _Trapezoids:
+    """Of every move, along the firmware's length."""
+
+    entry: FloatArray
+    peak: FloatArray
+    leave: FloatArray
+    ramp: FloatArray
+    nominal: FloatArray
+
+
+def _per_row(program: MachineProgram, ideal: TimeLaw, moves: Moves, of: _Trapezoids) -> Execution:
+    """The moves' ramps on the rows: a row that was merged into a move takes its part of the move's length."""
+    n = len(program)
+    move = np.minimum(np.searchsorted(moves.row, np.arange(n)), len(moves.row) - 1)
+    weight = np.where(ideal.length > 0, ideal.length, 0.0)
+    total = np.bincount(move, weights=weight, minlength=len(moves.row))
+    done = np.cumsum(weight)
+    began = np.concatenate([[0.0], done[moves.row]])[move]
+    part = np.where(total > 0, total, 1.0)[move]
+    end = np.clip((done - began) / part, 0.0, 1.0)
+    begin = np.clip((done - weight - began) / part, 0.0, 1.0)
+    length, a = moves.metric[move], of.ramp[move]
+    entry, peak, leave = of.entry[move], of.peak[move], of.leave[move]
+
+    def speed(fraction: FloatArray) -> FloatArray:
+        rising = np.sqrt(entry**2 + 2 * a * fraction * length)
+        falling = np.sqrt(leave**2 + 2 * a * (1 - fraction) * length)
+        return np.asarray(np.minimum(np.minimum(rising, falling), peak))
+
+    way = (end - begin) * length
+    v0, v1 = speed(begin), speed(end)
+    top = np.maximum(np.minimum(peak, np.sqrt(0.5 * (v0**2 + v1**2) + a * way)), np.maximum(v0, v1))
+    flat = np.maximum(way - (2 * top**2 - v0**2 - v1**2) / (2 * a), 0.0)
+    moves_at_all = (way > 0) & (top > 0)
+    duration = np.where(moves_at_all, (2 * top - v0 - v1) / a + flat / np.where(top > 0, top, 1.0), 0.0)
+    scale = np.where(moves_at_all, ideal.length / np.where(way > 0, way, 1.0), 0.0)
+    law = TimeLaw(
+        duration=duration,
+        length=ideal.length,
+        entry=v0 * scale,
+        peak=top * scale,
+        leave=v1 * scale,
+        acceleration=a * scale,
+        steady=ideal.steady,
+        limited_by=ideal.limited_by,
+    )
+    return Execution(law, way / of.nominal[move])
