@@ -7,15 +7,16 @@ import numpy as np
 from shapely.geometry import MultiPolygon
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.bead import bead_width
-from trunnion_core.layers import Bead
+from trunnion_core.layers import Bead, Layer
 from trunnion_core.settings import PrintSettings
 
 from trunnion_slicer.nonplanar.footprint import footprint
 from trunnion_slicer.nonplanar.grid import Grid, build_grid
 from trunnion_slicer.nonplanar.offset import Surfaces
-from trunnion_slicer.nonplanar.orient import corner_normals, smoothed
+from trunnion_slicer.nonplanar.orient import corner_normals
 from trunnion_slicer.nonplanar.paths import FlatPath, flat_paths
 from trunnion_slicer.nonplanar.project import Lifted, lift
+from trunnion_slicer.nonplanar.smooth import refined, smoothed
 from trunnion_slicer.nonplanar.stairs import gap_over_stairs
 
 
@@ -42,8 +43,8 @@ def sheet(stack: Surfaces, layer: int) -> Sheet:
     return Sheet(stack, layer, grid, footprint(surface, stack.patch.border, grid))
 
 
-def beads_of(on: Sheet, settings: PrintSettings) -> list[Bead]:
-    """Every bead of a layer on one patch: walls, then infill."""
+def beads_of(on: Sheet, planar: Sequence[Layer], settings: PrintSettings) -> list[Bead]:
+    """Every bead of a layer on one patch: walls, then infill. The lowest layer lies on the beads of `planar`."""
     paths = flat_paths(on.stack, on.layer, on.outline, settings)
     if not paths:
         return []
@@ -51,10 +52,13 @@ def beads_of(on: Sheet, settings: PrintSettings) -> list[Bead]:
     density = on.stack.densities(on.layer)
     lines = [path.points for path in paths]
     lowest = on.layer == on.stack.layers - 1
-    stairs = gap_over_stairs(on.stack, settings) if lowest else None
+    stairs = gap_over_stairs(on.stack, planar, settings) if lowest else None
     normals = corner_normals(on.stack.patch)
     lifted = lift(lines, on.grid, normals, density[faces], settings.extrusion_width, stairs)
-    axes = smoothed(lifted.points, lifted.axes, lifted.starts, float(np.radians(settings.nonplanar_smoothing)))
+    axes = lifted.axes
+    if settings.nonplanar_smoothing > 0 and settings.nonplanar_tool_axis == "normal":
+        lifted = refined(lifted)
+        axes = smoothed(lifted.points, lifted.axes, lifted.starts, float(np.radians(settings.nonplanar_smoothing)))
     height = _thickness(lifted) if lowest else np.full(len(axes), settings.layer_height)
     if settings.nonplanar_tool_axis == "vertical":
         height = height / np.maximum(lifted.axes[:, 2], 0.1)

@@ -17,9 +17,6 @@ CREASE_DEG = 20.0
 CREASE_JUMP = 0.035
 """Two degrees: a larger step of the tool axis at a point is spread over the path before and behind it."""
 
-PASSES = 128
-"""Rounds of smoothing: the tool's turns spread over about a dozen points of the path."""
-
 
 def corner_normals(patch: Patch) -> FloatArray:
     """(m, 3, 3) unit: at every corner the angle-weighted mean of the normals within CREASE_DEG of its facet's."""
@@ -97,38 +94,3 @@ def spread_jumps(
     values[:, 4:] /= np.linalg.norm(values[:, 4:], axis=1, keepdims=True)
     moved = starts + np.searchsorted(place, starts, side="left")
     return values[:, :3], values[:, 4:], values[:, 3], moved
-
-
-def smoothed(points: FloatArray, axes: FloatArray, starts: IntArray, tolerance: float) -> FloatArray:
-    """Axes (n, 3) that turn as evenly along the paths as a cone of `tolerance` rad about the given ones lets them.
-
-    Each round moves every axis to the mean of its neighbours on the path, weighted by how near they are, and back
-    into its cone along the great circle. Ends of open paths follow their one neighbour.
-    """
-    if tolerance <= 0 or len(points) < 2:
-        return axes
-    distance = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    weight = 1 / np.maximum(distance, 1e-3)
-    weight[starts[1:-1] - 1] = 0.0
-    back = np.concatenate([[0.0], weight])[:, None]
-    ahead = np.concatenate([weight, [0.0]])[:, None]
-    first, last = starts[:-1], starts[1:] - 1
-    loop = (points[first] == points[last]).all(axis=1)
-    now = axes
-    for _ in range(PASSES):
-        pulled = 1e-12 * now
-        pulled[1:] += back[1:] * now[:-1]
-        pulled[:-1] += ahead[:-1] * now[1:]
-        pulled[first[loop]] = pulled[last[loop]] = pulled[first[loop]] + pulled[last[loop]]
-        pulled /= np.linalg.norm(pulled, axis=1, keepdims=True)
-        now = _into_cone((now + pulled) / np.linalg.norm(now + pulled, axis=1, keepdims=True), axes, tolerance)
-    return now
-
-
-def _into_cone(axes: FloatArray, centres: FloatArray, tolerance: float) -> FloatArray:
-    """Axes moved along great circles to within `tolerance` rad of their centres."""
-    cosine = np.clip((axes * centres).sum(axis=1, keepdims=True), -1.0, 1.0)
-    side = axes - cosine * centres
-    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-300)
-    on_edge = np.cos(tolerance) * centres + np.sin(tolerance) * side
-    return np.where(cosine < np.cos(tolerance), on_edge, axes)
