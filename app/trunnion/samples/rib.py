@@ -7,7 +7,7 @@ from trunnion_core.mesh import Mesh
 
 from trunnion.samples._solids import from_manifold
 
-SETTINGS: dict[str, Any] = {"nonplanar_layers": 3}
+SETTINGS: dict[str, Any] = {}
 
 
 def make() -> Mesh:
