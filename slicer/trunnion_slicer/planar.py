@@ -46,6 +46,19 @@ NARROW_FILL = 0.6
 
 
 @dataclass(frozen=True, eq=False)
+class Collar:
+    """Where stairs must not stand high: around skin that is printed later, the nozzle's flat reaches over them."""
+
+    area: MultiPolygon
+    """Seen from above."""
+    low: float
+    high: float
+    """mm, from and up to which height stairs are kept low."""
+    most: float
+    """mm that a stair may stand above the part's surface there."""
+
+
+@dataclass(frozen=True, eq=False)
 class PlanarPlan:
     """Planar layers from the bed up, and what is worth saying about them."""
 
@@ -58,18 +71,21 @@ def planar_layers(mesh: Mesh, settings: PrintSettings) -> list[Layer]:
     return list(plan_planar(mesh, settings).layers)
 
 
-def plan_planar(mesh: Mesh, settings: PrintSettings) -> PlanarPlan:
+def plan_planar(mesh: Mesh, settings: PrintSettings, collar: Collar | None = None) -> PlanarPlan:
     """Layers from the bed up, each bead's points on the layer's upper plane, the tool upright.
 
     The mesh is solid and stands on z = 0. The first layer carries the skirt. Layers without material inside the part
-    stay, empty. Raises PlacementError when the part does not stand on the bed, MeshError when it is thinner than half
-    a layer, SettingsError for an unknown pattern.
+    stay, empty. In the collar, sections are taken so high that no stair stands out more than it allows. Raises
+    PlacementError when the part does not stand on the bed, MeshError when it is thinner than half a layer,
+    SettingsError for an unknown pattern.
     """
     require(settings.fill_pattern)
     tops, heights = _levels(mesh, settings)
     slices = sections(mesh, tops - heights / 2)
     if slices[0].is_empty:
         raise MeshError("mesh: the first layer is empty, the part should have a surface to stand on at z = 0")
+    if collar is not None and not collar.area.is_empty:
+        _keep_low(mesh, slices, tops, heights, collar)
     solid, top = _skins(slices, settings)
     layers = []
     for index, section in enumerate(slices):
@@ -87,6 +103,19 @@ def plan_planar(mesh: Mesh, settings: PrintSettings) -> PlanarPlan:
         beads += _inside(inside, solid[index], top[index], pass_)
         layers.append(Layer("planar", z, height, tuple(beads)))
     return PlanarPlan(tuple(layers), lost(slices, layers) + unsupported(layers))
+
+
+def _keep_low(mesh: Mesh, slices: list[MultiPolygon], tops: FloatArray, heights: FloatArray, collar: Collar) -> None:
+    """Take out of the sections what stands out too far in the collar."""
+    up = heights / 2 - collar.most
+    rows = np.flatnonzero((tops >= collar.low) & (tops - heights <= collar.high) & (up > 0))
+    higher = sections(mesh, (tops - heights / 2 + up)[rows])
+    for row, section in zip(rows.tolist(), higher, strict=True):
+        standing = shapely.intersection(shapely.difference(slices[row], section), collar.area)
+        if not standing.is_empty:
+            left = shapely.get_parts(as_multipolygon(shapely.difference(slices[row], standing)))
+            crumbs = shapely.covered_by(left, collar.area) & ~shapely.covered_by(left, section)
+            slices[row] = shapely.orient_polygons(MultiPolygon(list(left[~crumbs])))
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,7 @@ def _bare(section: MultiPolygon, layer: Layer) -> Sequence[Polygon]:
 
 def _warnings(layers: Sequence[Layer]) -> Iterator[Finding]:
     below: Sequence[Polygon | LineString] = ()
+    under: Layer | None = None
     for index, layer in enumerate(layers):
         islands = islands_of(layer.beads)
         if index and islands:
@@ -66,6 +67,8 @@ def _warnings(layers: Sequence[Layer]) -> Iterator[Finding]:
             if below:
                 carried[shapely.STRtree(below).query(islands, predicate="intersects")[0]] = True
             for row in np.flatnonzero(~carried):
+                if under is not None and _on_beads(islands[row], under):
+                    continue
                 place = islands[row].representative_point()
                 yield Finding(
                     "unsupported-island",
@@ -78,3 +81,9 @@ def _warnings(layers: Sequence[Layer]) -> Iterator[Finding]:
                 )
         thin = [bead for bead in layer.beads if bead.role == Role.OUTER_WALL and not bead.closed]
         below = [*islands, *(LineString(bead.points[:, :2]) for bead in thin)]
+        under = layer
+
+
+def _on_beads(island: Polygon, under: Layer) -> bool:
+    """Whether any bead of the layer below runs under the island; a loop of one bead looks like an island's wall."""
+    return any(island.intersects(LineString(bead.points[:, :2])) for bead in under.beads)

@@ -61,6 +61,13 @@ def find_region(mesh: Mesh, twin: IntArray, settings: PrintSettings) -> BoolArra
     return _drop_small_and_flat(mesh, region, twin, slope, footprint, settings)
 
 
+def worthwhile(mesh: Mesh, region: BoolArray, twin: IntArray, settings: PrintSettings) -> BoolArray:
+    """The region (m,) without the pieces that are flat within a layer or smaller than `nonplanar_min_area`."""
+    normal, area = face_normals(mesh.vertices, mesh.faces)
+    slope = np.degrees(np.arccos(np.clip(normal[:, 2], -1.0, 1.0)))
+    return _drop_small_and_flat(mesh, region, twin, slope, area * normal[:, 2], settings)
+
+
 def components(region: BoolArray, twin: IntArray) -> tuple[int, IntArray]:
     """How many pieces joined by edges the region has, and the piece of every face (m,), -1 outside."""
     rows = np.flatnonzero(region)
