@@ -13,6 +13,9 @@ from trunnion_gcode.words import significant
 FEED_SLACK = 2e-3
 """Relative. F is not written again while the last one is this close: a tenth of what a tip speed may be off."""
 
+MOST_INVERSE = 1e6
+"""Greatest F under G93: a move of 0.06 ms. Larger numbers are mistakes to most readers, and no drive can tell."""
+
 
 def feed_words(moves: Moves, dialect: Dialect) -> list[str]:
     """(m,) `F...` where F must be written, empty where the last one holds. GcodeError where a move takes no time."""
@@ -24,7 +27,7 @@ def feed_words(moves: Moves, dialect: Dialect) -> list[str]:
         row = int(moves.row[timeless[0]])
         raise GcodeError(f"row {row}: moves {moves.metric[timeless[0]]:g} in no time, should take some")
     if dialect.inverse_time:
-        text, _ = significant("F", 60.0 / np.where(moves.asked > 0, moves.asked, 1.0))
+        text, _ = significant("F", np.minimum(60.0 / np.where(moves.asked > 0, moves.asked, 1.0), MOST_INVERSE))
         return [f"F{word}" for word in text]
     wanted = np.where(measured, 60.0 * moves.metric / np.where(measured, moves.asked, 1.0), 1.0)
     text, read_back = significant("F", wanted)

@@ -14,3 +14,8 @@ def linear_first(linear: FloatArray, rotary: FloatArray, filament: FloatArray, t
     turned = np.linalg.norm(rotary, axis=1)
     without_linear = np.where(turned > 0, turned, np.abs(filament))
     return np.asarray(np.where(straight > threshold, straight, without_linear))
+
+
+def all_axes(linear: FloatArray, rotary: FloatArray, filament: FloatArray) -> FloatArray:
+    """The length over every axis, millimetres and degrees mixed, the filament being one of them."""
+    return np.asarray(np.linalg.norm(np.column_stack([linear, rotary, filament]), axis=1))

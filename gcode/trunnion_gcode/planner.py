@@ -9,7 +9,8 @@ Corners = Literal["marlin", "reprapfirmware", "klipper", "grbl", "blend"]
 marlin: classic jerk, or junction deviation where the profile gives one. reprapfirmware: no axis jumps by more than its
 corner speed. klipper: junction deviation over X, Y and Z from a square corner velocity, extra axes by their own corner
 speed, cruising held back where it would be short. grbl: junction deviation over all axes. blend: every move starts to
-ramp up while the one before it ramps down, so neither may be faster than its own length lets it be.
+ramp up while the one before it ramps down, each with half its acceleration, so none is faster than its own length lets
+it be.
 """
 
 
@@ -22,7 +23,5 @@ class Planner:
     """Moves that it looks ahead, at least; None where it sees all of them."""
     slowest: float = 0.0
     """Units/s; slower moves are sped up to this."""
-    starts_at_corner_speed: bool = False
-    """Whether a move from rest starts with the corner speed at once instead of from zero."""
-    stops_between_kinds: bool = False
-    """Whether it stops where printing turns into travelling and back."""
+    tolerance: float = 0.0
+    """mm that blends may leave the corner."""

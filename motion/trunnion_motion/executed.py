@@ -21,6 +21,10 @@ UNLIMITED = 1e12
 """Stands for an acceleration without a limit, in units/s²."""
 DEFAULT_DEVIATION = 0.01
 """mm. What GRBL is shipped with ($11)."""
+KLIPPER_UNLIMITED = 99999999.9
+"""mm/s² that Klipper gives moves without X, Y and Z."""
+KLIPPER_CRUISE = 0.5
+"""Share of the acceleration that its gentle passes use: one less minimum_cruise_ratio, by default."""
 BENDS = 2
 """Passes over the corners of curves: slower moves make slower corners."""
 
@@ -50,10 +54,37 @@ def executed(program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, d
         corner, _rest = drive.corners(nominal)
         nominal = kernel.bent(drive.share, nominal, moves.metric, corner, drive.acceleration)
     corner, rest = drive.corners(nominal)
-    blocks = len(nominal) + 1 if dialect.planner.blocks is None else max(dialect.planner.blocks, profile.planner.blocks)
     stops = _stops(moves, program)
-    entry, peak, leave = kernel.ramps(moves.metric, nominal, drive.ramp, corner, rest, stops, blocks)
+    if dialect.planner.corners == "klipper":
+        gentle = np.minimum(drive.ramp, drive.config.acceleration * KLIPPER_CRUISE)
+        entry, peak, leave = kernel.smoothed_ramps(drive.length, nominal, drive.ramp, corner, stops, gentle)
+    else:
+        seen = dialect.planner.blocks
+        blocks = len(nominal) + 1 if seen is None else max(seen, profile.planner.blocks)
+        entry, peak, leave = kernel.ramps(drive.length, nominal, drive.ramp, corner, rest, stops, blocks)
     return _per_row(program, ideal, moves, _Trapezoids(entry, peak, leave, drive.ramp, nominal))
+
+
+@dataclass(frozen=True)
+class KlipperConfig:
+    """What Klipper's [printer] section is taken to say about a machine of this profile."""
+
+    speed: float
+    """max_velocity: the fastest of the linear joints, mm/s."""
+    acceleration: float
+    """max_accel: that of the profile's planner, else of the weakest linear joint but Z, mm/s²."""
+    deviation: float
+    """mm, from square_corner_velocity, the smallest corner speed of the linear joints but Z."""
+
+
+def klipper_config(profile: MachineProfile) -> KlipperConfig:
+    """Klipper knows one speed and acceleration for X and Y together, so the weaker joint speaks for both."""
+    plane = [joint for joint in profile.joints if not joint.rotary and joint.letter != "Z"]
+    given = profile.planner.acceleration
+    acceleration = min(joint.acceleration for joint in plane) if given is None else given
+    square = min(joint.corner_speed for joint in plane)
+    fastest = max(joint.speed for joint in profile.joints if not joint.rotary)
+    return KlipperConfig(fastest, acceleration, square**2 * (np.sqrt(2) - 1) / acceleration)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +106,11 @@ class _Drive:
     """(k + 1,)."""
     corner_speed: FloatArray
     """(k + 1,)."""
+    linear: BoolArray
+    """(k + 1,) which columns are linear joints."""
     deviation: float | None
     """mm of junction deviation, where the profile gives one."""
+    config: "KlipperConfig"
 
     def corners(self, nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(m,) speed allowed into every move from the one before, and (m,) from rest."""
@@ -84,6 +118,22 @@ class _Drive:
         rest = np.minimum(nominal, rules.slowest)
         if rules.corners == "reprapfirmware":
             return kernel.jump_corners(self.share, nominal, self.kind, self.corner_speed), np.zeros(len(nominal))
+        if rules.corners == "klipper":
+            straight = (self.kind & 2) > 0
+            corner = kernel.square_corners(
+                self.share,
+                self.linear,
+                nominal,
+                self.length,
+                self.ramp,
+                straight,
+                self.corner_speed,
+                self.config.deviation,
+            )
+            return corner, rest
+        if rules.corners == "blend":
+            corner = kernel.blended_corners(self.share, self.linear, self.kind, nominal, self.ramp, rules.tolerance)
+            return corner, rest
         if rules.corners == "grbl" or self.deviation is not None:
             across = DEFAULT_DEVIATION if self.deviation is None else self.deviation
             like_marlin = rules.corners == "marlin"
@@ -104,8 +154,25 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
     travelling = printing if planner.travel_acceleration is None else planner.travel_acceleration
     kind = _kinds(moves, profile)
     along = np.where(kind & 1, np.where(moves.filament > 0, printing, travelling), UNLIMITED)
-    with np.errstate(divide="ignore"):
-        reach, push = (speed / np.abs(share)).min(axis=1), (acceleration / np.abs(share)).min(axis=1)
+    if dialect.planner.corners in ("grbl", "blend"):
+        along = np.full(len(along), UNLIMITED)
+    linear = np.array([not joint.rotary for joint in profile.joints] + [False])
+    config = klipper_config(profile)
+    if dialect.planner.corners == "klipper":
+        straight = (kind & 2) > 0
+        along = np.where(straight, config.acceleration, KLIPPER_UNLIMITED)
+        plane = linear & (np.array([*profile.letters, "E"]) != "Z")
+        own = np.where(straight[:, None], plane | (np.arange(len(plane)) == len(plane) - 1), False)
+        with np.errstate(divide="ignore"):
+            reach = np.where(own, np.inf, speed / np.abs(share)).min(axis=1)
+            push = np.where(own, np.inf, acceleration / np.abs(share)).min(axis=1)
+        reach = np.where(straight, np.minimum(reach, config.speed), reach)
+    else:
+        with np.errstate(divide="ignore"):
+            reach, push = (speed / np.abs(share)).min(axis=1), (acceleration / np.abs(share)).min(axis=1)
+    if dialect.planner.corners == "blend":
+        push = 0.5 * push
+        reach = np.minimum(reach, np.sqrt(np.minimum(along, push) * moves.metric))
     return _Drive(
         dialect=dialect,
         length=moves.metric,
@@ -115,7 +182,9 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
         ramp=np.minimum(along, push),
         acceleration=acceleration,
         corner_speed=np.append(profile.array("corner_speed") * profile.to_shown, extruder.corner_speed),
+        linear=linear,
         deviation=planner.junction_deviation,
+        config=config,
     )
 
 

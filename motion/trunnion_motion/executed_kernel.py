@@ -171,3 +171,119 @@ def ramps(
         entry[i], leave[i], peak[i] = first, out, max(top, first, out)
         speed = out
     return entry, peak, leave
+
+
+@numba.njit(cache=True, error_model="numpy")
+def square_corners(
+    share: FloatArray,
+    linear: BoolArray,
+    nominal: FloatArray,
+    length: FloatArray,
+    ramp: FloatArray,
+    kinematic: BoolArray,
+    limit: FloatArray,
+    deviation: float,
+) -> FloatArray:
+    """(m,) speed allowed into every move: Klipper's junction deviation over the linear columns.
+
+    The circle through the corner touches neither move beyond its middle; every other column may jump by its `limit`.
+    Moves without linear motion (`kinematic` false) begin and end at rest.
+    """
+    m, columns = share.shape
+    corner = np.zeros(m)
+    for i in range(1, m):
+        if not (kinematic[i] and kinematic[i - 1]):
+            continue
+        square = min(nominal[i], nominal[i - 1]) ** 2
+        cosine = 0.0
+        for j in range(columns):
+            if linear[j]:
+                cosine += share[i, j] * share[i - 1, j]
+            else:
+                jump = abs(share[i, j] - share[i - 1, j])
+                if jump > 0.0:
+                    square = min(square, (limit[j] / jump) ** 2)
+        half = np.sqrt(max(0.5 * (1.0 + cosine), 0.0))
+        other = np.sqrt(max(0.5 * (1.0 - cosine), 0.0))
+        if half < 1.0 and other > 0.0:
+            radius = deviation * half / (1.0 - half)
+            touch = 0.5 * half / other
+            square = min(square, min(radius * ramp[i], radius * ramp[i - 1]))
+            square = min(square, min(touch * length[i] * ramp[i], touch * length[i - 1] * ramp[i - 1]))
+        corner[i] = np.sqrt(square)
+    return corner
+
+
+@numba.njit(cache=True, error_model="numpy")
+def smoothed_ramps(
+    length: FloatArray,
+    nominal: FloatArray,
+    ramp: FloatArray,
+    corner: FloatArray,
+    stops: BoolArray,
+    gentle: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Entry, peak and leaving speed (m,) of every move, as Klipper's look-ahead gives them.
+
+    Besides the ramps proper, a second, gentler pair of passes with the accelerations `gentle` (m,) finds the top that
+    leaves room for cruising; runs of moves that only slow down gently are held to the top before them.
+    """
+    m = len(length)
+    entry, peak, leave = np.zeros(m), np.zeros(m), np.zeros(m)
+    gain, ease = 2.0 * ramp * length, 2.0 * gentle * length
+    into, soft = np.zeros(m), np.zeros(m)
+    for i in range(1, m):
+        if not stops[i]:
+            into[i] = min(corner[i] * corner[i], into[i - 1] + gain[i - 1])
+            soft[i] = min(into[i], soft[i - 1] + ease[i - 1])
+    begin, end = np.zeros(m), np.zeros(m)
+    out, out_soft, top = 0.0, 0.0, 0.0
+    waiting = m
+    for i in range(m - 1, -1, -1):
+        if i == m - 1 or stops[i + 1]:
+            out, out_soft, top = 0.0, 0.0, 0.0
+            waiting = i + 1
+        begin[i], end[i] = min(into[i], out + gain[i]), out
+        reach = out_soft + ease[i]
+        start_soft = min(soft[i], reach)
+        if start_soft < reach:
+            if start_soft + ease[i] > out_soft or waiting > i + 1:
+                top = min(nominal[i] * nominal[i], 0.5 * (start_soft + reach))
+                held = top
+                for w in range(i + 1, waiting):
+                    held = min(held, begin[w])
+                    entry[w], peak[w], leave[w] = held, held, min(end[w], held)
+            waiting = i
+            cruise = min(min(0.5 * (begin[i] + out + gain[i]), nominal[i] * nominal[i]), top)
+            entry[i], peak[i], leave[i] = min(begin[i], cruise), cruise, min(out, cruise)
+        out, out_soft = begin[i], start_soft
+    return np.sqrt(entry), np.sqrt(peak), np.sqrt(leave)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def blended_corners(
+    share: FloatArray, linear: BoolArray, kind: IntArray, nominal: FloatArray, ramp: FloatArray, tolerance: float
+) -> FloatArray:
+    """(m,) speed in the middle of LinuxCNC's parabolic blends, where the old and the new velocity are there by halves.
+
+    A blend may leave the corner by `tolerance`, which bounds the speed at which it begins.
+    """
+    m, columns = share.shape
+    corner = np.zeros(m)
+    for i in range(1, m):
+        if kind[i] % 4 != kind[i - 1] % 4:
+            continue
+        dot, size = 0.0, 0.0
+        old = 0.0
+        for j in range(columns):
+            if linear[j] or kind[i] % 4 != 3:
+                dot += share[i, j] * share[i - 1, j]
+                size += share[i, j] ** 2
+                old += share[i - 1, j] ** 2
+        cosine = min(max(dot / np.sqrt(size * old), -1.0), 1.0)
+        half, other = np.sqrt(0.5 * (1.0 + cosine)), np.sqrt(0.5 * (1.0 - cosine))
+        speed = min(nominal[i], nominal[i - 1])
+        if other > 0.0:
+            speed = min(speed, 2.0 * np.sqrt(min(ramp[i], ramp[i - 1]) * tolerance / other))
+        corner[i] = half * speed
+    return corner

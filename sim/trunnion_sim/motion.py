@@ -116,8 +116,8 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
             out = kernel.fresh_rows(room, k)
             at, made = kernel.execute(
                 at, block.letter, block.code, block.flags, block.word_start, block.word_letter, block.word_value,
-                block.line, block.length, letters, rotary, home, rules.g90_resets_e, rules.case_sensitive, state, out,
-                row_of_command, problem, rows,
+                block.line, block.length, letters, rotary, home, rules.g90_resets_e, rules.case_sensitive,
+                ord(rules.filament), state, out, row_of_command, problem, rows,
             )  # fmt: skip
             parts.append(kernel.joined([out], made))
             rows += made

@@ -102,6 +102,7 @@ def execute(
     home: NDArray[np.float64],
     g90_resets_e: bool,
     case_sensitive: bool,
+    feeder: int,
     state: NDArray[np.float64],
     out: Rows,
     row_of_command: NDArray[np.int64],
@@ -173,8 +174,8 @@ def execute(
                 v = value[letters[j]]
                 if not math.isnan(v):
                     offset[j] = (v if rotary[j] else v * unit) - q[j]
-            if not math.isnan(value[69]):
-                state[_E] = value[69] * unit
+            if not math.isnan(value[feeder]):
+                state[_E] = value[feeder] * unit
         elif c == 280:
             if made + 1 > room:
                 return i, made
@@ -214,8 +215,8 @@ def execute(
                     target[j] = q[j] + v if state[_REL] else v - offset[j]
                     moved = moved or target[j] != q[j]
             e = 0.0
-            if not math.isnan(value[69]):
-                v = value[69] * unit
+            if not math.isnan(value[feeder]):
+                v = value[feeder] * unit
                 e = v if state[_EREL] else v - state[_E]
                 state[_E] += e
                 e *= state[_FLOW]
@@ -238,7 +239,7 @@ def execute(
                 continue
             if made + pieces > room:
                 # undo the filament, since the command comes again with more room
-                if not math.isnan(value[69]):
+                if not math.isnan(value[feeder]):
                     state[_E] -= e / state[_FLOW]
                 return i, made
             begin = q.copy()

@@ -10,10 +10,17 @@ import numpy as np
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 
-from trunnion_sim import motion_kernel, replay_kernel
+from trunnion_sim import motion_kernel, replay_kernel, toolhead_kernel
 from trunnion_sim.limits import Limits
 from trunnion_sim.motion import Motion
 from trunnion_sim.rules import Rules
+
+GRBL_DEVIATION = 0.01
+"""mm: grblHAL's own setting $11, where the profile gives no junction deviation."""
+WITHOUT_F = 25.0
+"""mm/s before the first F, as Klipper has it."""
+BLEND_TOLERANCE = 0.01
+"""mm: the P of G64 that Trunnion's programs for LinuxCNC set."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +83,87 @@ def replay(motion: Motion, profile: MachineProfile, rules: Rules, limits: Limits
     waits = motion.dwell != 0
     stops = homing | waits
     stops[1:] |= homing[:-1]
+    length, asked, entry, cruise, leave, acceleration, duration = _law(
+        motion, profile, rules, limits, delta, homing, stops
+    )
+    before = np.where(np.isnan(motion.dwell), 0.0, motion.dwell)
+    begin = np.cumsum(before + duration) - duration
+    return Replay(length, asked, entry, cruise, leave, acceleration, begin, duration)
+
+
+def _law(
+    motion: Motion,
+    profile: MachineProfile,
+    rules: Rules,
+    limits: Limits,
+    delta: FloatArray,
+    homing: BoolArray,
+    stops: BoolArray,
+) -> toolhead_kernel.Law:
+    """Every row as the firmware's planner drives it; of firmwares without M201 and the like, the first limits hold."""
     deviation = profile.planner.junction_deviation
-    length, asked, entry, cruise, leave, acceleration, duration = replay_kernel.plan(
+    linear = np.array([not joint.rotary for joint in profile.joints])
+    first = limits.speed[0], limits.acceleration[0]
+    feed = np.where(motion.feed > 0, motion.feed, WITHOUT_F)
+    if rules.corners == "klipper":
+        toolhead = _klipper_toolhead(profile)
+        law = toolhead_kernel.klipper(
+            delta,
+            np.append(linear, False),
+            profile.letters.index("Z") if "Z" in profile.letters else -1,
+            feed,
+            stops,
+            *first,
+            limits.corner[0],
+            *toolhead,
+        )
+    elif rules.corners == "grbl":
+        across = GRBL_DEVIATION if deviation is None else deviation
+        blocks = max(rules.least_blocks, profile.planner.blocks)
+        law = toolhead_kernel.grbl(delta, feed, motion.inverse, stops, *first, across, blocks)
+    elif rules.corners == "linuxcnc":
+        law = toolhead_kernel.linuxcnc(
+            delta, np.append(linear, False), feed, motion.inverse, stops, *first, BLEND_TOLERANCE
+        )
+    else:
+        return _marlin_or_duet(motion, profile, rules, limits, delta, homing, stops)
+    return _homed(law, delta, homing, limits.speed[0])
+
+
+def _klipper_toolhead(profile: MachineProfile) -> tuple[float, float, float]:
+    """max_velocity, max_accel and square_corner_velocity that stand for the joints' own limits in X and Y."""
+    straight = [joint for joint in profile.joints if not joint.rotary]
+    plane = [joint for joint in straight if joint.letter != "Z"]
+    accel = profile.planner.acceleration
+    return (
+        max(joint.speed for joint in straight),
+        min(joint.acceleration for joint in plane) if accel is None else accel,
+        min(joint.corner_speed for joint in plane),
+    )
+
+
+def _homed(law: toolhead_kernel.Law, delta: FloatArray, homing: BoolArray, speed: FloatArray) -> toolhead_kernel.Law:
+    """Homing rows at every joint's full speed."""
+    length, asked, entry, cruise, leave, acceleration, duration = law
+    needed = (np.abs(delta[:, :-1]) / speed[:-1]).max(axis=1)
+    duration[homing] = needed[homing]
+    constant = np.divide(length, needed, out=np.zeros(len(length)), where=needed > 0)
+    for value in (entry, cruise, leave):
+        value[homing] = constant[homing]
+    return length, asked, entry, cruise, leave, acceleration, duration
+
+
+def _marlin_or_duet(
+    motion: Motion,
+    profile: MachineProfile,
+    rules: Rules,
+    limits: Limits,
+    delta: FloatArray,
+    homing: BoolArray,
+    stops: BoolArray,
+) -> toolhead_kernel.Law:
+    deviation = profile.planner.junction_deviation
+    law: toolhead_kernel.Law = replay_kernel.plan(
         delta,
         np.array([not joint.rotary for joint in profile.joints]),
         motion.feed,
@@ -95,9 +181,7 @@ def replay(motion: Motion, profile: MachineProfile, rules: Rules, limits: Limits
         rules.slowest,
         rules.starts_at_corner_speed,
     )
-    before = np.where(np.isnan(motion.dwell), 0.0, motion.dwell)
-    begin = np.cumsum(before + duration) - duration
-    return Replay(length, asked, entry, cruise, leave, acceleration, begin, duration)
+    return law
 
 
 def samples(motion: Motion, rows: IntArray, fractions: FloatArray) -> FloatArray:

@@ -21,8 +21,8 @@ class Rules:
     name: str
     commands: frozenset[tuple[str, int]]
     """Letter and ten times the number of every command it knows."""
-    corners: Literal["marlin", "per_axis"]
-    """How the speed at a corner follows from the joints' corner speeds: see `replay_kernel`."""
+    corners: Literal["marlin", "per_axis", "klipper", "grbl", "linuxcnc"]
+    """How the speed at a corner comes about: see `replay_kernel` and `toolhead_kernel`."""
     g90_resets_e: bool
     """Whether G90 and G91 also set the mode of the extruder."""
     case_sensitive: bool
@@ -37,6 +37,8 @@ class Rules:
     """mm/s; slower moves are sped up to this."""
     starts_at_corner_speed: bool
     """Whether a move from rest starts with the corner speed at once (classic jerk) instead of from zero."""
+    filament: str = "E"
+    """Letter of the filament."""
 
 
 def find_rules(name: str, source: str = "profile") -> Rules:

@@ -38,6 +38,7 @@ DIALECT = Dialect(
     planner=Planner("klipper"),
     pause="PAUSE",
     checksums=False,
+    shortest=2e-3,
     max_line=4096,
     setup=setup,
 )

@@ -9,15 +9,18 @@ from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.metrics import linear_first
 from trunnion_gcode.planner import Planner
 
+TOLERANCE = 0.01
+"""mm that corners may be rounded by."""
+
 DIALECT = Dialect(
     name="linuxcnc",
     metric=linear_first,
-    planner=Planner("blend"),
+    planner=Planner("blend", tolerance=TOLERANCE),
     inverse_time=True,
     relative_extrusion=False,
     extruder="U",
     travel="G1",
-    start=("G21", "G17", "G40", "G49", "G80", "G90", "G92 U0", "G64 P0.01", "G93"),
+    start=("G21", "G17", "G40", "G49", "G80", "G90", "G92 U0", f"G64 P{TOLERANCE}", "G93"),
     finish=("G94", "M2"),
     nozzle_temperature="M104 P%s",
     wait_nozzle="M109 P%s",
@@ -26,5 +29,6 @@ DIALECT = Dialect(
     fan="M106 P%s",
     progress=None,
     checksums=False,
+    shortest=2e-3,
     max_line=255,
 )

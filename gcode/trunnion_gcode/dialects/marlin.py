@@ -17,7 +17,7 @@ SHORTEST_LINEAR = 1e-3
 DIALECT = Dialect(
     name="marlin",
     metric=functools.partial(linear_first, threshold=SHORTEST_LINEAR),
-    planner=Planner("marlin", blocks=2, slowest=0.05, starts_at_corner_speed=True),
+    planner=Planner("marlin", blocks=2, slowest=0.05),
     shortest=2 * SHORTEST_LINEAR,
     minimum_steps=6,
 )

@@ -11,7 +11,7 @@ from trunnion_gcode.planner import Planner
 DIALECT = Dialect(
     name="reprapfirmware",
     metric=linear_first,
-    planner=Planner("reprapfirmware", blocks=40, stops_between_kinds=True),
+    planner=Planner("reprapfirmware", blocks=40),
     pause="M226",
     max_line=200,
     shortest=2e-3,

@@ -66,8 +66,11 @@ def check(context: Context) -> Iterator[Finding]:
 
 
 def _temperature(command: Command) -> float | None:
-    value = command.get("S")
-    return command.get("R") if value is None else value
+    for letter in "SRP":
+        value = command.get(letter)
+        if value is not None:
+            return value
+    return None
 
 
 def _limit(heater: str, value: float, limit: float, command: Command) -> Iterator[Finding]:
