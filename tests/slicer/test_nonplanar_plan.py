@@ -16,7 +16,13 @@ from trunnion_core.settings import PrintSettings
 from trunnion_slicer.nonplanar.plan import NonplanarPlan, plan_nonplanar
 from trunnion_slicer.section_kernels import twins
 
-BASE = {"layer_height": 0.3, "extrusion_width": 0.4, "fill_density": 100.0, "skirts": 0}
+BASE = {
+    "layer_height": 0.3,
+    "extrusion_width": 0.4,
+    "fill_density": 100.0,
+    "skirts": 0,
+    "nonplanar_smoothing": 0.0,
+}
 
 
 def over_box(height: Callable[[FloatArray, FloatArray], FloatArray], size: float, cells: int) -> Mesh:

@@ -34,7 +34,7 @@ def test_the_outermost_beads_lie_on_the_skin(name: str) -> None:
     triangle, weights = grid.locate(points[:, :2])
     off = np.linalg.norm(np.einsum("nk,nkd->nd", weights, grid.triangles[triangle]) - points, axis=1)
     assert off.max() < 0.03
-    assert np.percentile(off, 99) < 0.004
+    assert np.percentile(off, 99) < 0.006
 
 
 @pytest.mark.parametrize("name", samples.names())

@@ -9,7 +9,7 @@ from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 from trunnion_slicer.nonplanar.plan import plan_nonplanar
 from trunnion_slicer.nonplanar.project import Lifted
-from trunnion_slicer.nonplanar.smooth import refined, smoothed
+from trunnion_slicer.nonplanar.smooth import FAIRING, faired, refined, smoothed
 
 TOLERANCE = np.radians(2.0)
 
@@ -51,6 +51,27 @@ def test_no_other_axes_in_the_cones_bend_less() -> None:
     options = {"maxiter": 20000, "maxfun": 1000000, "ftol": 1e-15, "gtol": 1e-12}
     best = minimize(energy, given, bounds=bounds, method="L-BFGS-B", options=options)
     assert energy(np.arctan2(smooth[:, 0], smooth[:, 2])) <= 1.15 * best.fun
+
+
+def test_tips_leave_their_facets_by_microns_and_lose_their_kinks() -> None:
+    x = np.arange(0, 30.01, 0.2)
+    corners = np.arange(0, 31.0)
+    z = np.interp(x, corners, 60 - np.sqrt(60**2 - (corners - 15) ** 2))
+    points = np.column_stack([x, np.zeros_like(x), z])
+    smooth = faired(points, np.array([0, len(x)]))
+    assert np.linalg.norm(smooth - points, axis=1).max() <= FAIRING * (1 + 1e-9)
+    kinks = [np.abs(np.diff(path[:, 2], 2) / 0.2).max() for path in (points, smooth)]
+    assert kinks[1] < 0.35 * kinks[0]
+    assert kinks[1] > 0.9 * 0.2 / 60
+
+
+def test_corners_of_a_path_stay_corners() -> None:
+    there = np.column_stack([np.arange(0, 10, 0.2), np.zeros(50), np.zeros(50)])
+    back = there[::-1] + np.array([0, 0.4, 0])
+    points = np.concatenate([there, back])
+    step = np.diff(faired(points, np.array([0, 100])), axis=0)
+    assert between(*(np.tile(v / np.linalg.norm(v), (1, 1)) for v in (step[48], step[49]))) > 88.0
+    assert between(*(np.tile(v / np.linalg.norm(v), (1, 1)) for v in (step[49], step[50]))) > 88.0
 
 
 def test_paths_do_not_hear_each_other() -> None:

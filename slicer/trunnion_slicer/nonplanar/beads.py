@@ -1,7 +1,7 @@
 """Surfaces become beads: flat paths lifted, with the width that makes every piece's volume that of its place."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from shapely.geometry import MultiPolygon
@@ -16,7 +16,7 @@ from trunnion_slicer.nonplanar.offset import Surfaces
 from trunnion_slicer.nonplanar.orient import corner_normals
 from trunnion_slicer.nonplanar.paths import FlatPath, flat_paths
 from trunnion_slicer.nonplanar.project import Lifted, lift
-from trunnion_slicer.nonplanar.smooth import refined, smoothed
+from trunnion_slicer.nonplanar.smooth import faired, refined, smoothed
 from trunnion_slicer.nonplanar.stairs import gap_over_stairs
 
 
@@ -59,6 +59,7 @@ def beads_of(on: Sheet, planar: Sequence[Layer], settings: PrintSettings) -> lis
     if settings.nonplanar_smoothing > 0 and settings.nonplanar_tool_axis == "normal":
         lifted = refined(lifted)
         axes = smoothed(lifted.points, lifted.axes, lifted.starts, float(np.radians(settings.nonplanar_smoothing)))
+        lifted = replace(lifted, points=faired(lifted.points, lifted.starts))
     height = _thickness(lifted) if lowest else np.full(len(axes), settings.layer_height)
     if settings.nonplanar_tool_axis == "vertical":
         height = height / np.maximum(lifted.axes[:, 2], 0.1)

@@ -1,10 +1,10 @@
-"""Tool axes along paths become a smooth field: the least bending that a cone about every given axis allows.
+"""Faceted paths become smooth ones: the least bending of tool axes and of tips that cones and balls about them allow.
 
-What costs a machine time are jumps in the rate at which its rotary joints turn along the path. So the axes sought
-have the least integral of squared second derivatives by path length, each within a cone about the one it replaces.
-The constraint is a weight: at the answer every axis is held by a spring towards the middle of its cone, of no force
-inside the cone and of whatever force it takes on its edge (Karush-Kuhn-Tucker). Rounds of a banded linear solve
-stiffen the springs of axes that are outside and slacken those inside; a last step along great circles makes it exact.
+What costs a machine time are jumps in the rates at which its joints move along the path. So the axes sought have the
+least integral of squared second derivatives by path length, each within a cone about the one it replaces, and so have
+the points, each within a ball. The constraint is a weight: at the answer every row is held by a spring towards its
+middle, of no force inside and of whatever force it takes on the edge (Karush-Kuhn-Tucker). Rounds of a banded linear
+solve stiffen the springs of rows that are outside and slacken those inside; a last step inwards makes it exact.
 """
 
 from itertools import pairwise
@@ -18,10 +18,14 @@ from trunnion_slicer.nonplanar.project import Lifted
 
 ROUNDS = 60
 """Rounds of springs made stiffer or slacker; after that many an axis is a few hundredths of its cone off the best."""
-SPACING = 0.4
-"""mm. Rows are no farther apart while and after axes are smoothed, so that a turn is not a polygon of few corners."""
+SPACING = 0.2
+"""mm. Rows are no farther apart while and after paths are smoothed, so that a turn is not a polygon of few corners."""
+FAIRING = 0.004
+"""mm. How far smoothing may move the tip: as little as thinning (`project.CHORD`) does, less than any printer shows."""
 SHORTEST = 0.02
 """mm. Pieces shorter than this count as this long: what turns within them is not the curve's bending."""
+CORNER = 0.02
+"""What bending at a sharp corner of the path counts, as a share of that on a straight: the tip slows down anyway."""
 REACH = 4.0
 """mm. Springs start so soft that an axis listens to the path this far on both sides."""
 OVERLAP = 12.0
@@ -41,21 +45,19 @@ def smoothed(points: FloatArray, axes: FloatArray, starts: IntArray, tolerance: 
     """
     if tolerance <= 0 or len(points) < 3:
         return axes
-    rows, starts_in, mine, twin, share = _unrolled(points, starts)
-    centres = axes[rows]
-    band = _bending(points[rows], starts_in)
-    springs = soft = np.full(len(rows), REACH**-4) * _spans(points[rows], starts_in)
-    now = centres
-    for _ in range(ROUNDS):
-        total = band.copy()
-        total[2] += springs
-        now = solveh_banded(total, springs[:, None] * centres, check_finite=False)
-        now /= np.linalg.norm(now, axis=1, keepdims=True)
-        off = 2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(now - centres, axis=1), 1.0))
-        springs = np.clip(springs * np.clip(off / (INSIDE * tolerance), 0.3, 3.0), SOFTEST * soft, STIFFEST * soft)
-    result = share[:, None] * now[mine] + (1 - share[:, None]) * now[twin]
-    result /= np.linalg.norm(result, axis=1, keepdims=True)
-    return _into_cone(result, axes, tolerance)
+    return _into_cone(_least_bending(points, axes, starts, tolerance, unit=True), axes, tolerance)
+
+
+def faired(points: FloatArray, starts: IntArray) -> FloatArray:
+    """Points (n, 3) mm, each at most FAIRING from the one it replaces, on paths that bend as evenly as that allows.
+
+    Paths as in `smoothed`; their corners, which are meant, stay corners.
+    """
+    if len(points) < 3:
+        return points
+    moved = _least_bending(points, points, starts, FAIRING, unit=False) - points
+    size = np.linalg.norm(moved, axis=1, keepdims=True)
+    return np.asarray(points + moved * np.minimum(1.0, FAIRING / np.maximum(size, 1e-300)))
 
 
 def refined(lifted: Lifted) -> Lifted:
@@ -78,6 +80,27 @@ def refined(lifted: Lifted) -> Lifted:
     axes[share == 1] = lifted.axes[row[share == 1]]
     starts = np.concatenate([[0], end])[lifted.starts]
     return Lifted(between(lifted.points), axes, (lifted.volume / parts)[row], (lifted.run / parts)[row], starts)
+
+
+def _least_bending(
+    points: FloatArray, values: FloatArray, starts: IntArray, tolerance: float, *, unit: bool
+) -> FloatArray:
+    """Values (n, 3), unit vectors if `unit`, that bend least while next to `tolerance` from those given."""
+    rows, starts_in, mine, twin, share = _unrolled(points, starts)
+    centres = values[rows]
+    band = _bending(points[rows], starts_in)
+    springs = soft = np.full(len(rows), REACH**-4) * _spans(points[rows], starts_in)
+    now = centres
+    for _ in range(ROUNDS):
+        total = band.copy()
+        total[2] += springs
+        now = centres + solveh_banded(total, -_banded(band, centres), check_finite=False)
+        if unit:
+            now /= np.linalg.norm(now, axis=1, keepdims=True)
+        off = np.linalg.norm(now - centres, axis=1)
+        springs = np.clip(springs * np.clip(off / (INSIDE * tolerance), 0.3, 3.0), SOFTEST * soft, STIFFEST * soft)
+    result = share[:, None] * now[mine] + (1 - share[:, None]) * now[twin]
+    return result / np.linalg.norm(result, axis=1, keepdims=True) if unit else result
 
 
 def _unrolled(points: FloatArray, starts: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray, FloatArray]:
@@ -135,7 +158,7 @@ def _bending(points: FloatArray, starts: IntArray) -> FloatArray:
     step = np.diff(points, axis=0) / length[:, None]
     straight = 0.5 * (1 + np.clip((step[1:] * step[:-1]).sum(axis=1), -1, 1))
     inner: NDArray[np.bool_] = np.isfinite(span)
-    weight = np.where(inner, (0.02 + 0.98 * straight**4) / np.where(inner, span, 1.0), 0.0)
+    weight = np.where(inner, (CORNER + straight**4) / np.where(inner, span, 1.0), 0.0)
     middle = -(ahead + back)
     band = np.zeros((3, n))
     band[2, :-2] += weight * back**2
@@ -145,6 +168,16 @@ def _bending(points: FloatArray, starts: IntArray) -> FloatArray:
     band[1, 2:] += weight * middle * ahead
     band[0, 2:] += weight * back * ahead
     return band
+
+
+def _banded(band: FloatArray, values: FloatArray) -> FloatArray:
+    """The symmetric matrix of that upper band times values (n, 3)."""
+    product = band[2][:, None] * values
+    for offset in (1, 2):
+        side = band[2 - offset, offset:, None]
+        product[:-offset] += side * values[offset:]
+        product[offset:] += side * values[:-offset]
+    return np.asarray(product)
 
 
 def _into_cone(axes: FloatArray, centres: FloatArray, tolerance: float) -> FloatArray:
