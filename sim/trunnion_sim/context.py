@@ -148,7 +148,8 @@ class Context:
             over = points[(core if core.any() else beads)[rows]][:, :2]
             bounds = over.min(axis=0) - 2.0, over.max(axis=0) + 2.0
         motions = Pieces(rows, starts, points, axes, share, present[rows])
-        return lay_down(motions, len(self.motion), *bounds, cell, self.profile.nozzle_flat_diameter)
+        flat, bore = self.profile.nozzle_flat_diameter, self.profile.nozzle_diameter
+        return lay_down(motions, len(self.motion), *bounds, cell, flat, bore)
 
     @cached_property
     def scene(self) -> Scene:
@@ -156,27 +157,33 @@ class Context:
         return make_scene(self.profile)
 
     @cached_property
-    def hits(self) -> Hits:
-        """Where bodies enter what stands on the bed; homing is the machine's own business."""
-        n = len(self.motion)
+    def bead_height(self) -> FloatArray:
+        """(n,) mm: as the comments say, else half the bore."""
         known = self.rows.height
-        height = np.where(np.isfinite(known) & (known > 0), known, self.profile.nozzle_diameter / 2)
+        return np.where(np.isfinite(known) & (known > 0), known, self.profile.nozzle_diameter / 2)
+
+    @cached_property
+    def stadium_width(self) -> FloatArray:
+        """(n,) mm across a stadium (a rectangle and two half-discs) of the fed volume; 0 where no bead is laid."""
         area = np.divide(
             self.motion.filament * self.profile.filament_area,
             self.tip_length,
-            out=np.zeros(n),
+            out=np.zeros(len(self.motion)),
             where=self.feeds & (self.tip_length > 0),
         )
-        # a stadium of that area: rectangle and two half-discs
-        width = np.where(area > 0, area / height + (1 - math.pi / 4) * height, 0.0)
+        return np.where(area > 0, area / self.bead_height + (1 - math.pi / 4) * self.bead_height, 0.0)
+
+    @cached_property
+    def hits(self) -> Hits:
+        """Where bodies enter what stands on the bed; homing is the machine's own business."""
         start_tip, start_axis = forward(self.profile, self.motion.start[None])
         return sweep(
             self.scene,
             np.vstack([self.motion.start, self.motion.joints]),
             np.vstack([start_tip, self.points]),
             np.vstack([start_axis, self.tool_axes]),
-            np.append(0.0, width),
-            np.append(0.0, height),
+            np.append(0.0, self.stadium_width),
+            np.append(0.0, self.bead_height),
             np.append(False, ~self.homing),
         ).without_start()
 

@@ -12,6 +12,10 @@ the gap opens sideways, the bead ends where its area is spent.
       |      A       | h                           |             |             |
        \____________/                               \____________A____________/    pores below the groove
 
+**Steps.** Plastic leaves through a bore, not through a point: what is fed while the tip moves on by the bore's
+diameter is under the bore all the while and goes where there is room. So the gap, at every place across, is the mean
+over that way. Nothing is carried farther than that.
+
 **No room.** Plastic that finds other plastic in its place first goes into the pores beside and below that the height
 field remembers. Half of what is left widens the bead on its free side, by a quarter of its half width at most; the
 rest rises behind the nozzle and stays as a bulge. (All to the side would hand the same lack on from line to line for
@@ -110,12 +114,14 @@ def lay_down(
     high: FloatArray,
     cell: float,
     flat_diameter: float,
+    bore_diameter: float,
     ground: Ground | None = None,
 ) -> Deposit:
     """Execute the pieces over the rectangle `low` to `high` (mm, X and Y) with cells of `cell` mm.
 
-    `ground` gives what stands there before the first bead; by default the bed at 0. Cells grow where the rectangle
-    would need more than MOST_CELLS. About a million steps of 2 cells a second.
+    The nozzle's end is flat over `flat_diameter` mm, with a bore of `bore_diameter`. `ground` gives what stands there
+    before the first bead; by default the bed at 0. Cells grow where the rectangle would need more than MOST_CELLS.
+    About 300,000 steps of 2 cells a second.
     """
     size = np.maximum(high - low, cell)
     cell = max(cell, math.sqrt(float(size[0] * size[1]) / MOST_CELLS))
@@ -137,6 +143,7 @@ def lay_down(
         pieces.volume,
         pieces.present,
         flat_diameter / 2,
+        bore_diameter,
         stats,
         depth_point,
     )

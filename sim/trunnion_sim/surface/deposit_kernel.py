@@ -43,6 +43,7 @@ def run(
     volumes: _F,
     present: NDArray[np.bool_],
     flat: float,
+    bore: float,
     stats: _F,
     depth_point: _F,
 ) -> None:
@@ -58,6 +59,7 @@ def run(
     last_t = np.zeros(3)
     last_end = np.full(3, np.nan)
     result = np.zeros(9)
+    spots = np.zeros((max(1, round(bore / (2 * cell))), 7))
     x1, y1 = x0 + (nx - 1) * cell, y0 + (ny - 1) * cell
     for m in range(len(rows)):
         if not present[m]:
@@ -98,13 +100,15 @@ def run(
         area = volumes[m] / length
         steps = max(1, math.ceil(length / (2 * cell)))
         step = length / steps
-        own = 1.5 * math.sqrt(4 * area / math.pi) + 2 * step
+        own = max(1.5 * math.sqrt(4 * area / math.pi), bore) + 2 * step
         joined = abs(p[0] - last_end[0]) + abs(p[1] - last_end[1]) + abs(p[2] - last_end[2]) < 1e-6
         turned = joined and t[0] * last_t[0] + t[1] * last_t[1] + t[2] * last_t[2] < 0.996
         for s in range(steps):
             c = p + t * ((s + 0.5) * step)
             here = way + (s + 0.5) * step
-            _section(top, before, stamp, pores, x0, y0, cell, c, t, b, normal_z, area, flat, here - own, result)
+            _under_bore(starts, ends, axes, volumes, present, m, (s + 0.5) * step, bore, spots)
+            area = spots[:, 6].mean()
+            _section(top, before, stamp, pores, x0, y0, cell, c, b, normal_z, area, flat, here - own, spots, result)
             stats[row, 0] += result[3] * step
             stats[row, 1] += step
             stats[row, 2] += result[4] * step
@@ -159,6 +163,60 @@ def _read(top: _G, before: _G, stamp: _F, x0: float, y0: float, cell: float, x: 
 
 
 @njit(cache=True)
+def _under_bore(
+    starts: _F, ends: _F, axes: _F, volumes: _F, present: NDArray[np.bool_], m: int, at: float, bore: float, spots: _F
+) -> None:
+    """Where the tip is within half a bore before and behind `at` mm on piece m; where the bead ends, its end.
+
+    spots (k, 7): the point, the unit vector to the right of the path and the bead's area there, k spread evenly over
+    the bore.
+    """
+    count = len(spots)
+    for k in range(count):
+        piece = m
+        s = at + ((k + 0.5) / count - 0.5) * bore
+        length = _way(starts[piece], ends[piece])
+        while s > length and piece + 1 < len(starts) and _goes_on(starts, ends, volumes, present, piece):
+            s -= length
+            piece += 1
+            length = _way(starts[piece], ends[piece])
+        while s < 0 and piece > 0 and _goes_on(starts, ends, volumes, present, piece - 1):
+            piece -= 1
+            length = _way(starts[piece], ends[piece])
+            s += length
+        spots[k, 6] = volumes[piece] / max(length, 1e-12)
+        t = (ends[piece] - starts[piece]) / max(length, 1e-12)
+        a = axes[piece]
+        spots[k, :3] = starts[piece] + min(max(s, 0.0), length) * t
+        b = np.array([a[1] * t[2] - a[2] * t[1], a[2] * t[0] - a[0] * t[2], a[0] * t[1] - a[1] * t[0]])
+        spots[k, 3:6] = b / max(math.sqrt(b[0] ** 2 + b[1] ** 2 + b[2] ** 2), 1e-12)
+
+
+@njit(cache=True)
+def _way(p: _F, q: _F) -> float:
+    return math.sqrt((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2 + (q[2] - p[2]) ** 2)
+
+
+@njit(cache=True)
+def _goes_on(starts: _F, ends: _F, volumes: _F, present: NDArray[np.bool_], m: int) -> bool:
+    """Whether the bead of piece m goes on in the next."""
+    return bool(present[m + 1] and present[m] and volumes[m + 1] > 0 and volumes[m] > 0) and bool(
+        abs(starts[m + 1, 0] - ends[m, 0]) + abs(starts[m + 1, 1] - ends[m, 1]) + abs(starts[m + 1, 2] - ends[m, 2])
+        < 1e-6
+    )
+
+
+@njit(cache=True)
+def _gap(top: _G, before: _G, stamp: _F, x0: float, y0: float, cell: float, spots: _F, u: float, since: float) -> float:
+    """Vertical gap `u` mm to the right of the path, mean over the spots under the bore."""
+    total = 0.0
+    for k in range(len(spots)):
+        x, y = spots[k, 0] + u * spots[k, 3], spots[k, 1] + u * spots[k, 4]
+        total += spots[k, 2] + u * spots[k, 5] - _read(top, before, stamp, x0, y0, cell, x, y, since)
+    return total / len(spots)
+
+
+@njit(cache=True)
 def _section(
     top: _G,
     before: _G,
@@ -168,15 +226,15 @@ def _section(
     y0: float,
     cell: float,
     c: _F,
-    t: _F,
     b: _F,
     normal_z: float,
     area: float,
     flat: float,
     since: float,
+    spots: _F,
     result: _F,
 ) -> None:
-    """The bead's section at point c.
+    """The bead's section at point c, above the gap that the `spots` under the bore have on average.
 
     result: 0 left and 1 right half width, 2 height of the section, 3 gap below it, 4 whether unsupported,
     5 crowded and 6 bulged area, 7 how far the section's upper side lies above the path (negative: below), 8 share of
@@ -188,7 +246,7 @@ def _section(
     under = np.empty(9)
     for k in range(9):
         u = (k - 4) * 0.1 * flat
-        under[k] = c[2] + u * b[2] - _read(top, before, stamp, x0, y0, cell, c[0] + u * b[0], c[1] + u * b[1], since)
+        under[k] = _gap(top, before, stamp, x0, y0, cell, spots, u, since)
     typical = np.sort(under)[6]
     clear = min(typical, BLOCKED * typical)
     gap = 0.0
@@ -231,8 +289,7 @@ def _section(
         for k in range(samples):
             u = (k + 0.5) * reach / samples
             x, y = c[0] + sign * u * b[0], c[1] + sign * u * b[1]
-            there = _read(top, before, stamp, x0, y0, cell, x, y, since)
-            g = (c[2] + sign * u * b[2] - there) * normal_z + shift
+            g = _gap(top, before, stamp, x0, y0, cell, spots, sign * u, since) * normal_z + shift
             room += min(max(g, 0.0), height)
             # where the gap opens sideways, the plastic is used up sooner: the bead ends where its area is spent
             deep = min(max(g, 0.0), max(height, thread))
@@ -258,8 +315,7 @@ def _section(
         if need > 0 and lack[side] == 0:
             while need > 0 and wide[side] < limit:
                 u = wide[side] + du / 2
-                there = _read(top, before, stamp, x0, y0, cell, c[0] + sign * u * b[0], c[1] + sign * u * b[1], since)
-                g = (c[2] + sign * u * b[2] - there) * normal_z + shift
+                g = _gap(top, before, stamp, x0, y0, cell, spots, sign * u, since) * normal_z + shift
                 g = min(max(g, 0.0), height)
                 if g * du >= need:
                     wide[side] += need / g
