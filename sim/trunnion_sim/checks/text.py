@@ -95,7 +95,7 @@ def _commands(context: Context) -> Iterator[Finding]:
 
 
 def _words(context: Context) -> Iterator[Finding]:
-    allowed = set(context.profile.letters) | set("EFS")
+    allowed = set(context.profile.letters) | {context.rules.filament, "F", "S"}
     if any(code in (20, 30) for letter, code in context.motion.code_count if letter == "G"):
         allowed |= set("IJKRP")
     for letter, line in sorted(context.oddities.letters.items(), key=lambda item: item[1]):
