@@ -144,6 +144,21 @@ def _passes(
                 v = speed[j] / rate
                 top = min(top, v * v)
         ceiling[i] = top
+    # Between samples x is straight: where that would pass over a joint's limit in the middle, the higher end gives way,
+    # and both where the joint is fastest inside the interval.
+    for i in range(n - 1):
+        step = path[i + 1] - path[i]
+        for j in range(k):
+            a, b = second[i, j], second[i + 1, j]
+            inside = a * b < 0.0
+            rate = abs(first[i, j] + step * (0.5 * a * a / (a - b) if inside else (3.0 * a + b) / 8.0))
+            if rate <= 0.0:
+                continue
+            top = (speed[j] / rate) ** 2
+            low = min(ceiling[i], ceiling[i + 1])
+            high = top if inside or low > top else 2.0 * top - low
+            ceiling[i] = min(ceiling[i], high)
+            ceiling[i + 1] = min(ceiling[i + 1], high)
 
     # Every constraint is a band  -limit <= g u + h x <= limit  with x at the start of the interval.
     g = np.empty(2 * k)
