@@ -1,8 +1,8 @@
 """The loop that lays beads on a height field: see `deposit` for the model.
 
-Four numbers a cell: the surface, the surface before the bead that is being laid came by, the way of the tip at which it
-came by, and how much of the column below is pores. A bead never takes itself for what is there: of cells that it
-touched within the last `own` mm of its way the surface before counts.
+Five numbers a cell: the surface, the surface before the bead that is being laid came by, the way of the tip at which it
+came by, how much of the column below is pores, and how much of the surface is a bulge behind the nozzle. A bead never
+takes itself for what is there: of cells that it touched within the last `own` mm of its way the surface before counts.
 """
 
 import math
@@ -55,6 +55,7 @@ def run(
     before = np.zeros((ny, nx), np.float32)
     stamp = np.full((ny, nx), -1e30)
     pores = np.zeros((ny, nx), np.float32)
+    bulge = np.zeros((ny, nx), np.float32)
     way = 0.0
     last_t = np.zeros(3)
     last_end = np.full(3, np.nan)
@@ -81,7 +82,7 @@ def run(
             way += length
             continue
         if volumes[m] <= 0:
-            _travel(top, x0, y0, cell, p, q, length, row, stats, depth_point)
+            _travel(top, bulge, x0, y0, cell, p, q, length, row, stats, depth_point)
             last_end[:] = np.nan
             way += 1e3  # whatever was laid before is what is there
             continue
@@ -116,8 +117,8 @@ def run(
             stats[row, 4] += result[6] * step
             stats[row, 6] += result[8] * step
             if s == 0 and turned:
-                _draw(top, before, stamp, pores, x0, y0, cell, p, t, b, normal_z, 0.0, True, result, here, own)
-            _draw(top, before, stamp, pores, x0, y0, cell, c, t, b, normal_z, step / 2, False, result, here, own)
+                _draw(top, before, stamp, pores, bulge, x0, y0, cell, p, t, b, normal_z, 0.0, True, result, here, own)
+            _draw(top, before, stamp, pores, bulge, x0, y0, cell, c, t, b, normal_z, step / 2, False, result, here, own)
         way += length
         last_t[:] = t
         last_end[:] = q
@@ -125,9 +126,22 @@ def run(
 
 @njit(cache=True)
 def _travel(
-    top: _G, x0: float, y0: float, cell: float, p: _F, q: _F, length: float, row: int, stats: _F, depth_point: _F
+    top: _G,
+    bulge: _G,
+    x0: float,
+    y0: float,
+    cell: float,
+    p: _F,
+    q: _F,
+    length: float,
+    row: int,
+    stats: _F,
+    depth_point: _F,
 ) -> None:
-    """How deep the tip dips below the surface on a travel; its two ends touch what it comes from and goes to."""
+    """How deep the tip dips below the surface on a travel; its two ends touch what it comes from and goes to.
+
+    Bulges do not count: they are soft, rose behind a nozzle at this height, and the next one presses them flat.
+    """
     ny, nx = top.shape
     n = max(1, math.ceil(length / cell))
     for s in range(n + 1):
@@ -135,7 +149,7 @@ def _travel(
         x, y, z = p[0] + f * (q[0] - p[0]), p[1] + f * (q[1] - p[1]), p[2] + f * (q[2] - p[2])
         i, j = round((x - x0) / cell), round((y - y0) / cell)
         if 0 <= i < nx and 0 <= j < ny:
-            depth = top[j, i] - z
+            depth = top[j, i] - bulge[j, i] - z
             if top[j, i] > 0 and depth > stats[row, 5]:
                 stats[row, 5] = depth
                 depth_point[row, 0] = x
@@ -329,7 +343,7 @@ def _section(
     result[1] = wide[1]
     result[2] = height
     result[3] = gap
-    result[4] = 1.0 if (gap > REACH * thread and not contact) else 0.0
+    result[4] = 1.0 if (under.min() * normal_z > REACH * thread and not contact) else 0.0
     result[5] = crowded
     result[6] = bulged
     result[7] = shift + bulged / (wide[0] + wide[1])
@@ -341,6 +355,7 @@ def _draw(
     before: _G,
     stamp: _F,
     pores: _G,
+    bulge: _G,
     x0: float,
     y0: float,
     cell: float,
@@ -365,6 +380,7 @@ def _draw(
     j0 = max(0, math.ceil((c[1] - reach_y - y0) / cell))
     j1 = min(ny - 1, math.floor((c[1] + reach_y - y0) / cell))
     edge = min(height / 2, radius)
+    raised = result[6] / max(left + right, 1e-9) / normal_z
     for j in range(j0, j1 + 1):
         dy = y0 + j * cell - c[1]
         for i in range(i0, i1 + 1):
@@ -391,6 +407,7 @@ def _draw(
                 hole = lower - before[j, i]
                 pores[j, i] = max(0.0, hole)
                 top[j, i] = upper
+                bulge[j, i] = raised
             elif stamp[j, i] <= here - own:
                 pores[j, i] = 0.0
             stamp[j, i] = here
