@@ -4,14 +4,15 @@ With G94, F = 60 * metric / seconds (units a minute); with G93, F = 60 / seconds
 """
 
 import numpy as np
+from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.errors import GcodeError
 
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.moves import Moves
 from trunnion_gcode.words import significant
 
-FEED_SLACK = 2e-3
-"""Relative. F is not written again while the last one is this close: a tenth of what a tip speed may be off."""
+FEED_SLACK = 5e-4
+"""Relative. F is not written again while the last one is this close: with its four digits, F is true within 0.1 %."""
 
 MOST_INVERSE = 1e6
 """Greatest F under G93: a move of 0.06 ms. Larger numbers are mistakes to most readers, and no drive can tell."""
@@ -19,19 +20,29 @@ MOST_INVERSE = 1e6
 
 def feed_words(moves: Moves, dialect: Dialect) -> list[str]:
     """(m,) `F...` where F must be written, empty where the last one holds. GcodeError where a move takes no time."""
-    if not len(moves.row):
-        return []
-    measured = moves.metric > 0
-    timeless = np.flatnonzero(measured & ~(moves.asked > 0))
+    return _words(moves.row, moves.metric, moves.asked, dialect)[0]
+
+
+def speeds_read(moves: Moves, asked: FloatArray, dialect: Dialect) -> FloatArray:
+    """(m,) speed along the metric in units/s that the firmware reads where moves shall take `asked` (m,) s."""
+    return _words(moves.row, moves.metric, asked, dialect)[1]
+
+
+def _words(row: IntArray, metric: FloatArray, asked: FloatArray, dialect: Dialect) -> tuple[list[str], FloatArray]:
+    if not len(row):
+        return [], np.zeros(0)
+    measured = metric > 0
+    timeless = np.flatnonzero(measured & ~(asked > 0))
     if timeless.size:
-        row = int(moves.row[timeless[0]])
-        raise GcodeError(f"row {row}: moves {moves.metric[timeless[0]]:g} in no time, should take some")
+        first = timeless[0]
+        raise GcodeError(f"row {int(row[first])}: moves {metric[first]:g} in no time, should take some")
     if dialect.inverse_time:
-        text, _ = significant("F", np.minimum(60.0 / np.where(moves.asked > 0, moves.asked, 1.0), MOST_INVERSE))
-        return [f"F{word}" for word in text]
-    wanted = np.where(measured, 60.0 * moves.metric / np.where(measured, moves.asked, 1.0), 1.0)
-    text, read_back = significant("F", wanted)
-    return _only_changes(text, wanted.tolist(), read_back.tolist(), measured.tolist())
+        text, read = significant("F", np.minimum(60.0 / np.where(asked > 0, asked, 1.0), MOST_INVERSE))
+        return [f"F{word}" for word in text], metric * read / 60.0
+    wanted = np.where(measured, 60.0 * metric / np.where(measured, asked, 1.0), 1.0)
+    text, read = significant("F", wanted)
+    said, held = _only_changes(text, wanted.tolist(), read.tolist(), measured.tolist())
+    return said, np.where(measured, held, 0.0) / 60.0
 
 
 def slowest(moves: Moves) -> float:
@@ -40,9 +51,12 @@ def slowest(moves: Moves) -> float:
     return float(np.min(moves.metric[measured] / moves.asked[measured], initial=np.inf))
 
 
-def _only_changes(text: list[str], wanted: list[float], read_back: list[float], measured: list[bool]) -> list[str]:
-    """One pass over the rows, since whether F is written depends on the F written last."""
+def _only_changes(
+    text: list[str], wanted: list[float], read_back: list[float], measured: list[bool]
+) -> tuple[list[str], FloatArray]:
+    """F where it must be written, and the F in force. One pass, since writing depends on the F written last."""
     out = []
+    held = []
     modal = 0.0
     for word, value, back, moves in zip(text, wanted, read_back, measured, strict=True):
         if not moves or abs(value - modal) <= FEED_SLACK * value:
@@ -50,4 +64,5 @@ def _only_changes(text: list[str], wanted: list[float], read_back: list[float], 
         else:
             modal = back
             out.append(f"F{word}")
-    return out
+        held.append(modal)
+    return out, np.array(held)

@@ -12,6 +12,7 @@ from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
 from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.feed import speeds_read
 from trunnion_gcode.moves import Moves, make_moves
 
 from trunnion_motion import executed_kernel as kernel
@@ -53,6 +54,8 @@ def executed(program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, d
     for _ in range(BENDS):
         corner, _rest = drive.corners(nominal)
         nominal = kernel.bent(drive.share, nominal, moves.metric, corner, drive.acceleration)
+    asked = moves.metric / nominal
+    nominal = np.minimum(np.maximum(speeds_read(moves, asked, dialect), dialect.planner.slowest), drive.reach)
     corner, rest = drive.corners(nominal)
     stops = _stops(moves, program)
     if dialect.planner.corners == "klipper":
@@ -62,7 +65,7 @@ def executed(program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, d
         seen = dialect.planner.blocks
         blocks = len(nominal) + 1 if seen is None else max(seen, profile.planner.blocks)
         entry, peak, leave = kernel.ramps(drive.length, nominal, drive.ramp, corner, rest, stops, blocks)
-    return _per_row(program, ideal, moves, _Trapezoids(entry, peak, leave, drive.ramp, nominal))
+    return _per_row(program, ideal, moves, _Trapezoids(entry, peak, leave, drive.ramp, asked))
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,8 @@ class _Drive:
     """(m,) 1 where joints move, 2 where linear ones do, 4 where filament moves, added up."""
     nominal: FloatArray
     """(m,) units/s wanted."""
+    reach: FloatArray
+    """(m,) units/s that the joints can go."""
     ramp: FloatArray
     """(m,) units/s²."""
     acceleration: FloatArray
@@ -179,6 +184,7 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
         share=share,
         kind=kind,
         nominal=np.minimum(np.maximum(moves.metric / moves.asked, dialect.planner.slowest), reach),
+        reach=reach,
         ramp=np.minimum(along, push),
         acceleration=acceleration,
         corner_speed=np.append(profile.array("corner_speed") * profile.to_shown, extruder.corner_speed),
@@ -214,7 +220,8 @@ class _Trapezoids:
     peak: FloatArray
     leave: FloatArray
     ramp: FloatArray
-    nominal: FloatArray
+    asked: FloatArray
+    """s that F asks for."""
 
 
 def _per_row(program: MachineProgram, ideal: TimeLaw, moves: Moves, of: _Trapezoids) -> Execution:
@@ -253,4 +260,4 @@ def _per_row(program: MachineProgram, ideal: TimeLaw, moves: Moves, of: _Trapezo
         steady=ideal.steady,
         limited_by=ideal.limited_by,
     )
-    return Execution(law, way / of.nominal[move])
+    return Execution(law, (end - begin) * of.asked[move])

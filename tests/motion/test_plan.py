@@ -113,7 +113,7 @@ def test_no_joint_leaves_its_limits_or_caps(profile, dome, settings):
     assert_allclose(program.duration[moving], times[moving, -1], rtol=1e-9)
     beads = program.width > 0
     assert (program.tip_length[beads] / program.cruise[beads] <= program.tip_speed[beads] * (1 + 1e-9)).all()
-    assert (program.cruise <= program.duration * (1 + 1e-9)).all()
+    assert (program.cruise <= program.duration * 1.001).all()  # F has four digits
     assert (np.abs(steps[moving]) / program.cruise[moving][:, None] <= profile.array("speed") * (1 + 1e-9)).all()
 
 
