@@ -1,12 +1,13 @@
 """A solid, placed mesh becomes layers and a toolpath: the whole of slicing in one call."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
 from trunnion_core.findings import Finding
 from trunnion_core.layers import LayerStack
 from trunnion_core.mesh import Mesh
+from trunnion_core.profile_file import SolidTable
 from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
 
@@ -27,17 +28,18 @@ class SliceResult:
     """Seconds of every stage, in the order of the work."""
 
 
-def slice_mesh(mesh: Mesh, settings: PrintSettings) -> SliceResult:
+def slice_mesh(mesh: Mesh, settings: PrintSettings, head: Sequence[SolidTable] = ()) -> SliceResult:
     """Layers and toolpath of `mesh`, a closed solid that stands on z = 0 where it is to be printed.
 
     The space of the non-planar layers, if any, is taken out of the part first; what is left is sliced planar and
-    printed before them. Raises MeshError or PlacementError for a part that cannot be sliced, SettingsError for an
+    printed before them. `head` is what carries the nozzle (convex bodies in the tool frame, mm): skin that it cannot
+    be over without entering the part stays planar. Raises MeshError or PlacementError for a part that cannot be sliced, SettingsError for an
     unknown infill pattern.
     """
     clock = _Clock()
-    plan = plan_nonplanar(mesh, settings)
+    plan = plan_nonplanar(mesh, settings, head, clock.lap)
     clock.lap("nonplanar")
-    planar = plan_planar(mesh if plan is None else plan.planar_mesh, settings)
+    planar = plan_planar(mesh, settings) if plan is None else plan.planar
     clock.lap("planar")
     stack = LayerStack(planar.layers + (() if plan is None else plan.layers))
     findings = planar.findings + (() if plan is None else plan.findings)
@@ -55,5 +57,5 @@ class _Clock:
 
     def lap(self, name: str) -> None:
         now = perf_counter()
-        self.laps[name] = now - self._last
+        self.laps[name] = self.laps.get(name, 0.0) + now - self._last
         self._last = now

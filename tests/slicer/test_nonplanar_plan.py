@@ -13,6 +13,7 @@ from trunnion_core.layers import Bead, Layer
 from trunnion_core.mesh import Mesh
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
+from trunnion_slicer.nonplanar.offset import FLOOR_RAISED
 from trunnion_slicer.nonplanar.plan import NonplanarPlan, plan_nonplanar
 from trunnion_slicer.section_kernels import twins
 
@@ -87,7 +88,7 @@ def skin_area(mesh: Mesh, region: "np.typing.NDArray[np.bool_]") -> float:
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_space_taken_out_is_the_skin_times_the_thickness(name: str) -> None:
     mesh, settings, plan = planned(name)
-    thickness = settings.nonplanar_layers * settings.layer_height
+    thickness = (settings.nonplanar_layers - FLOOR_RAISED) * settings.layer_height
     expected = skin_area(mesh, plan.region) * thickness
     # Curvature changes the area by up to thickness / radius on the way down: 0.6 / 25 on the pipe, half on average.
     assert volume(mesh) - volume(plan.planar_mesh) == pytest.approx(expected, rel=0.02)
@@ -129,7 +130,8 @@ def test_the_lowest_layer_fills_what_the_planar_layers_leave(name: str) -> None:
     printed_top = h * np.floor(highest(plan.planar_mesh) / h + 0.5)
     cell = np.ptp(mesh.bounds[:, 0]) * np.ptp(mesh.bounds[:, 1]) / len(points)
     space = (highest(mesh) - printed_top).sum() * cell
-    assert sum(laid(layer) for layer in plan.layers) == pytest.approx(space, rel=0.012)
+    # Steps have round edges, which take some more.
+    assert 0.99 * space < sum(laid(layer) for layer in plan.layers) < 1.06 * space
 
 
 def test_points_lie_on_the_sphere_and_tools_on_its_normals() -> None:

@@ -25,6 +25,11 @@ THIN_SHARE, THIN_AREA = 0.75, 0.01
 """A relaxed surface is refused where its layers are thinner or thicker than nominal by more than the first on more
 than the second of the footprint."""
 
+FLOOR_RAISED = 0.2
+"""Share of the lowest layer that is left to the planar layers under it. Their stairs make it half a layer thicker in
+places and thinner in others; a bead thicker than it is wide falls into itself and leaves deep grooves, a thin one is
+pressed flat. So it is 0.3 to 1.3 layers thick rather than 0.5 to 1.5."""
+
 CRUMB_SHARE = 1e-4
 """Share of the footprint that may stay folded: slivers of a tessellation, narrower than any bead."""
 
@@ -73,6 +78,15 @@ def offset_surfaces(patch: Patch, layers: int, height: float) -> Surfaces:
         steps = unfolded
         surfaces.append(patch.vertices + depth * height * steps)
     return Surfaces(patch, np.stack(surfaces), layers)
+
+
+def with_raised_floor(stack: Surfaces) -> Surfaces:
+    """The stack with its lowest surface moved up by FLOOR_RAISED of the lowest layer."""
+    if not stack.layers:
+        return stack
+    surfaces = stack.surfaces.copy()
+    surfaces[-1] += FLOOR_RAISED * (surfaces[-2] - surfaces[-1])
+    return Surfaces(stack.patch, surfaces, stack.wanted)
 
 
 def footprints(triangles: FloatArray) -> FloatArray:

@@ -18,9 +18,9 @@ from trunnion_slicer.nonplanar.grid import Grid, build_grid
 from trunnion_slicer.nonplanar.offset import Surfaces
 from trunnion_slicer.nonplanar.tops import Tops, bead_tops
 
-THINNEST, THICKEST = 0.4, 2.0
-"""Shares of the nominal thickness between which the layer stays. Stairs need half to one and a half, their round edges
-and grooves a little more; what is still more comes from places where planar layers end (a border, a hole)."""
+THINNEST, THICKEST = 0.25, 1.8
+"""Shares of the nominal thickness between which the layer stays. Stairs need 0.3 to 1.3, their round edges and
+grooves a little more; what is still more comes from places where planar layers end (a border, a hole)."""
 
 DEEPEST, HIGHEST = 2.0, 0.6
 """In layer heights: how far below and above the floor planar beads count as what the layer lies on."""
