@@ -89,6 +89,11 @@ class Context:
         return self.moved & ~self.homing & (self.motion.filament > 0)
 
     @cached_property
+    def priming(self) -> BoolArray:
+        """(n,) whether the row lies before the first layer that the comments name: lines that only fill the nozzle."""
+        return np.asarray((self.rows.layer < 0) & (self.rows.layer >= 0).any())
+
+    @cached_property
     def inside(self) -> tuple[IntArray, FloatArray, FloatArray]:
         """Rows (m,), tip (m, 3) and tool axis (m, 3) along the motion, so close that arcs of rotaries are seen."""
         rows, fractions = pieces(self.motion, self.profile, TURN_STEP)
@@ -130,7 +135,7 @@ class Context:
     def lay_down(self, cell: float, bounds: tuple[FloatArray, FloatArray] | None = None) -> Deposit | None:
         """Lay every bead down on a height field with cells of `cell` mm over `bounds` (low and high, X and Y).
 
-        Without bounds the field covers every bead but the skirt. None where the program lays nothing.
+        Without bounds the field covers every bead but the skirt and priming. None where the program lays nothing.
         """
         present = ~self.homing & (self.homed | ~self.homing.any())
         beads = self.feeds & present
@@ -144,7 +149,7 @@ class Context:
         volume = np.where(self.feeds, self.motion.filament * self.profile.filament_area, 0.0)[rows]
         share = np.divide(volume * way, whole, out=np.zeros(len(rows)), where=whole > 0)
         if bounds is None:
-            core = beads & (self.rows.role != Role.SKIRT)
+            core = beads & (self.rows.role != Role.SKIRT) & ~self.priming
             over = points[(core if core.any() else beads)[rows]][:, :2]
             bounds = over.min(axis=0) - 2.0, over.max(axis=0) + 2.0
         motions = Pieces(rows, starts, points, axes, share, present[rows])
@@ -197,9 +202,11 @@ class Context:
         value: FloatArray | None = None,
         limit: FloatArray | float | None = None,
         joint: Joint | None = None,
+        together: bool = False,
     ) -> Iterator[Finding]:
         """A finding for every run of offending rows, at its worst row; beyond MOST the rest becomes one.
 
+        `together` makes one finding of all, for what a program does over and over in the same way.
         Values of a joint are given in internal units and shown in mm or degrees. The worst row is the one where
         `value` is farthest from `limit`, or the first.
         """
@@ -207,8 +214,7 @@ class Context:
         if not hit.size:
             return
         starts = np.concatenate([[0], np.flatnonzero(np.diff(hit) > GAP) + 1])
-        if len(starts) > MOST:
-            starts = starts[:MOST]
+        starts = starts[: 1 if together else MOST]
         ends = np.append(starts[1:], len(hit))
         excess = None
         if value is not None:

@@ -20,8 +20,8 @@ SHORTEST = 2.0
 """mm of bead that is worth a finding."""
 BRIDGE = 20.0
 """mm that ordinary filament bridges with ease."""
-LONGEST_DOUBLE = 5.0
-"""mm: seams and corners overlap themselves for shorter stretches."""
+LONGEST_DOUBLE = 10.0
+"""mm: seams, corners and the joints of infill along a wall overlap for shorter stretches in every slicer's programs."""
 OVER, CROWDED = 0.6, 0.5
 """Share of a bead's plastic that finds no room, or of its place that is taken."""
 DIP = 0.4
@@ -34,10 +34,11 @@ def check(context: Context) -> Iterator[Finding]:
     if deposit is None:
         return
     bead: IntArray = np.cumsum(~context.feeds, dtype=np.int64)
+    meant = context.feeds & ~context.priming
     laid = _sum(bead, deposit.laid)
     hanging = _sum(bead, deposit.unsupported)
     whole = (hanging > 0.95 * laid) & (laid > SHORTEST)
-    in_air = whole[bead] & context.feeds & (deposit.laid > 0)
+    in_air = whole[bead] & meant & (deposit.laid > 0)
     yield from context.find(
         "bead-in-air",
         "error",
@@ -46,7 +47,7 @@ def check(context: Context) -> Iterator[Finding]:
         value=np.nan_to_num(deposit.gap),
         limit=context.layer_height,
     )
-    loose = (deposit.unsupported > 0.9 * deposit.laid) & (deposit.laid > 0) & context.feeds
+    loose = (deposit.unsupported > 0.9 * deposit.laid) & (deposit.laid > 0) & meant
     span = _run_length(loose, deposit.laid)
     yield from context.find(
         "long-bridge",
@@ -58,7 +59,7 @@ def check(context: Context) -> Iterator[Finding]:
     )
     volume = context.motion.filament * context.profile.filament_area
     share = np.divide(deposit.crowded, volume, out=np.zeros(len(volume)), where=context.feeds & (deposit.laid > 0))
-    share = np.where(context.feeds, np.maximum(share, deposit.taken), 0.0)
+    share = np.where(meant, np.maximum(share, deposit.taken), 0.0)
     double = _run_length(share > OVER, deposit.laid) > LONGEST_DOUBLE
 
     def message(row: int) -> str:

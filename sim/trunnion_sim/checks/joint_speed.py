@@ -40,7 +40,14 @@ def check(context: Context) -> Iterator[Finding]:
         message = partial(_message, joint, asked)
         yield from context.find("joint-speed", "error", serious, message, value=asked, limit=joint.speed, joint=joint)
         yield from context.find(
-            "joint-speed-clamped", "warning", over & ~serious, message, value=asked, limit=joint.speed, joint=joint
+            "joint-speed-clamped",
+            "warning",
+            over & ~serious,
+            message,
+            value=asked,
+            limit=joint.speed,
+            joint=joint,
+            together=True,
         )
 
 

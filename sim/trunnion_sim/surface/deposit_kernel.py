@@ -343,7 +343,10 @@ def _section(
     result[1] = wide[1]
     result[2] = height
     result[3] = gap
-    result[4] = 1.0 if (under.min() * normal_z > REACH * thread and not contact) else 0.0
+    nearest = under.min()
+    for k in range(len(spots)):  # a line that is crossed carries the bead, however little of the bore is over it
+        nearest = min(nearest, spots[k, 2] - _read(top, before, stamp, x0, y0, cell, spots[k, 0], spots[k, 1], since))
+    result[4] = 1.0 if (nearest * normal_z > REACH * thread and not contact) else 0.0
     result[5] = crowded
     result[6] = bulged
     result[7] = shift + bulged / (wide[0] + wide[1])
