@@ -3,6 +3,7 @@
 
     python3 dev.py demo [...]      a sample part from mesh to printed on the software machine
     python3 dev.py test [...]      the test suite (further words go to pytest)
+    python3 dev.py browser [...]   the tests that need chromium
     python3 dev.py lint            formatting, lint, types and import rules
     python3 dev.py run WORDS...    the trunnion command with those words
     python3 dev.py lock            write requirements/*.txt anew from pyproject.toml
@@ -36,6 +37,9 @@ def main(words: list[str]) -> int:
     if command == "test":
         install("dev")
         return run(PYTHON, "-m", "pytest", "-n", "auto", "--dist", "worksteal", *rest)
+    if command == "browser":
+        install("dev")
+        return run(PYTHON, "-m", "pytest", "-m", "browser", "tests/browser", *rest)
     if command == "lint":
         install("dev")
         return max(

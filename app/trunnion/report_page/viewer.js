@@ -254,7 +254,7 @@ function drawPlots() {
   const ratio = devicePixelRatio || 1, width = plots.clientWidth * ratio, height = plots.clientHeight * ratio;
   if (plots.width !== width || plots.height !== height || !plotImage) {
     plots.width = width; plots.height = height;
-    const pen = plots.getContext("2d"), band = height / plotted.length, ink = getComputedStyle(document.body).color;
+    const pen = plots.getContext("2d", { willReadFrequently: true }), band = height / plotted.length, ink = getComputedStyle(document.body).color;
     pen.font = `${11 * ratio}px system-ui`; pen.fillStyle = ink; pen.lineWidth = ratio;
     plotted.forEach((plot, b) => {
       const low = new Float32Array(width).fill(Infinity), high = new Float32Array(width).fill(-Infinity);
@@ -278,7 +278,7 @@ function drawPlots() {
     });
     plotImage = pen.getImageData(0, 0, width, height);
   }
-  const pen = plots.getContext("2d");
+  const pen = plots.getContext("2d", { willReadFrequently: true });
   pen.putImageData(plotImage, 0, 0);
   pen.fillStyle = "#d7263d"; pen.fillRect(now / (duration || 1) * (plots.width - 1), 0, ratio, plots.height);
 }
@@ -296,7 +296,7 @@ function legend() {
 byId("time").addEventListener("input", (event) => goTo(event.target.value / 1e6 * duration));
 byId("colour").addEventListener("change", (event) => { if (gl) beads.colour = buffer(beadColours(event.target.value)); legend(); draw(); });
 for (const name of ["machine", "beads", "travels", "deviation", "frame"]) byId(name).addEventListener("change", () => { legend(); draw(); });
-if (!deviation) byId("deviation-label").remove();
+byId("deviation-label").hidden = !deviation;
 let playing = false, before = 0;
 function tick(at) {
   if (!playing) return;
