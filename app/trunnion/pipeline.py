@@ -90,7 +90,7 @@ def make_job(part: Part, profile: MachineProfile, settings: PrintSettings, timin
     """Slice a part and plan its motion on the machine. Raises UnreachableError, SettingsError or MeshError."""
     timings = timings or Timings()
     settings = settings_for(profile, settings)
-    sliced = slice_mesh(part.mesh, settings)
+    sliced = slice_mesh(part.mesh, settings, profile.tool_bodies)
     timings.seconds.update(sliced.timings)
     with timings.stage("motion"):
         planned = plan_motion(sliced.toolpath, profile, settings)

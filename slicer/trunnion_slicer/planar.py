@@ -114,7 +114,7 @@ def _keep_low(mesh: Mesh, slices: list[MultiPolygon], tops: FloatArray, heights:
         standing = shapely.intersection(shapely.difference(slices[row], section), collar.area)
         if not standing.is_empty:
             left = shapely.get_parts(as_multipolygon(shapely.difference(slices[row], standing)))
-            crumbs = shapely.covered_by(left, collar.area) & ~shapely.covered_by(left, section)
+            crumbs = shapely.is_empty(shapely.buffer(left, -SLIVER)) & ~shapely.covered_by(left, section)
             slices[row] = shapely.orient_polygons(MultiPolygon(list(left[~crumbs])))
 
 

@@ -33,8 +33,8 @@ def slice_mesh(mesh: Mesh, settings: PrintSettings, head: Sequence[SolidTable] =
 
     The space of the non-planar layers, if any, is taken out of the part first; what is left is sliced planar and
     printed before them. `head` is what carries the nozzle (convex bodies in the tool frame, mm): skin that it cannot
-    be over without entering the part stays planar. Raises MeshError or PlacementError for a part that cannot be sliced, SettingsError for an
-    unknown infill pattern.
+    be over without entering the part stays planar. Raises MeshError or PlacementError for a part that cannot be sliced,
+    SettingsError for an unknown infill pattern.
     """
     clock = _Clock()
     plan = plan_nonplanar(mesh, settings, head, clock.lap)

@@ -15,7 +15,7 @@ RING_RADIUS, RING_HALF, HUB_RADIUS = 17.5, 3.4, 6.0
 
 
 def make() -> Mesh:
-    """42 mm across and 7.2 mm high; ring, spokes and hub top out at 7.2, 4.4 and 6 mm: a nozzle fits between them."""
+    """42 mm across and 9.2 mm high; ring, spokes and hub top out at 9.2, 6.4 and 8 mm: a nozzle fits between them."""
     from manifold3d import CrossSection, Manifold, OpType
 
     section = CrossSection([_profile()])
@@ -28,7 +28,7 @@ def make() -> Mesh:
 def _profile() -> FloatArray:
     """The ring's section: upright flanks and an arched top."""
     s = np.linspace(1.0, -1.0, 19)
-    top = 4.2 + 3.0 * np.sqrt(1.0 - (0.96 * s) ** 2)
+    top = 6.2 + 3.0 * np.sqrt(1.0 - (0.96 * s) ** 2)
     arch = np.column_stack([RING_RADIUS + RING_HALF * s, top])
     feet = np.array([[RING_RADIUS - RING_HALF, 0.0], [RING_RADIUS + RING_HALF, 0.0]])
     return np.vstack([feet, arch])
@@ -36,10 +36,10 @@ def _profile() -> FloatArray:
 
 def _spoke() -> Mesh:
     x, y = np.meshgrid(np.linspace(4.0, 15.6, 20), np.linspace(-2.6, 2.6, 11), indexing="ij")
-    return sheet(x, y, 4.2 - 0.08 * y * y + 0.006 * (x - 10.0) ** 2)
+    return sheet(x, y, 6.2 - 0.08 * y * y + 0.006 * (x - 10.0) ** 2)
 
 
 def _hub() -> Mesh:
     angle = np.arange(64) * (2 * np.pi / 64)
     outline = HUB_RADIUS * np.column_stack([np.cos(angle), np.sin(angle)])
-    return dome(outline, lambda x, y: 6.0 - 1.1 * (x * x + y * y) / HUB_RADIUS**2, rings=10)
+    return dome(outline, lambda x, y: 8.0 - 1.1 * (x * x + y * y) / HUB_RADIUS**2, rings=10)

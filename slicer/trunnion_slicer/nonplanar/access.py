@@ -18,7 +18,6 @@ from trunnion_core.findings import Finding
 from trunnion_core.mesh import Mesh
 from trunnion_core.profile_file import SolidTable
 from trunnion_core.settings import PrintSettings
-from trunnion_core.tolerance import WELD_DISTANCE
 
 from trunnion_slicer.nonplanar.head import frusta
 from trunnion_slicer.nonplanar.material import Material, material, spread_points
@@ -48,7 +47,7 @@ UPRIGHT = 0.35
 """Tangent of the lean up to which a face under a border is a wall, cut down together with the skin that ends on it."""
 
 SNAP = 0.15
-"""Share of an edge: where the border would pass a corner nearer than this, it goes through the corner."""
+"""Share of an edge: the border runs through a free corner rather than nearer to it, never nearer to a blocked one."""
 
 SAME_AXIS = 1e-5
 """Tool axes that differ by less are tested once."""
@@ -132,11 +131,12 @@ class _Scene:
         # Planar stairs stand up to half a layer above the surface that they stand for.
         self.margins = np.where(on_skin, MARGIN, MARGIN + settings.layer_height / 2)
         self.sinks = np.where(on_skin, 1.0 / np.maximum(normal[self.skin.face, 2], 0.1), 0.0)
-        if self.depth > 0:
-            self.sinks[self._walls(mesh, region)] = 1.0
+        walls = self._walls(mesh, region)
+        self.sinks[walls] = 1.0
+        self.margins[walls] = MARGIN
 
     def _walls(self, mesh: Mesh, region: BoolArray) -> IntArray:
-        """Points that are no skin but, while the lowest layer is printed, not there: tops of walls that end at it."""
+        """Points that are no skin, but rise and fall with it: tops of walls that end at its border."""
         sides = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2)
         twin = _twin(mesh)
         half = np.flatnonzero(np.repeat(region, 3) & ((twin < 0) | ~region[twin // 3]))
@@ -145,10 +145,11 @@ class _Scene:
         outside = np.flatnonzero(self.sinks == 0)
         points = self.skin.points[outside]
         tree = cKDTree(edges[:, :2])
-        away, closest = (np.asarray(found) for found in tree.query(points[:, :2], distance_upper_bound=self.depth))
+        reach = max(self.depth, SQUEEZE)
+        away, closest = (np.asarray(found) for found in tree.query(points[:, :2], distance_upper_bound=reach))
         near = np.isfinite(away)
         under = edges[closest[near], 2] - points[near, 2]
-        return np.asarray(outside[near][(away[near] <= UPRIGHT * under + SQUEEZE) & (under > -WELD_DISTANCE)])
+        return np.asarray(outside[near][(away[near] <= UPRIGHT * under + SQUEEZE) & (under > -SQUEEZE)])
 
     def clearance(self, tips: FloatArray, axes: FloatArray, steps: FloatArray) -> tuple[FloatArray, IntArray]:
         """Least clearance (n,) and its body of the head on the skin (n, 3) and on the lowest layer under it."""
@@ -264,12 +265,13 @@ def _cut(mesh: Mesh, region: BoolArray, clearance: FloatArray) -> tuple[Mesh, Bo
     at[mesh.faces[region]] = clearance[region]
     sides = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2)[region].reshape(-1, 2)
     edges = np.unique(np.sort(sides, axis=1), axis=0)
-    a, b = at[edges[:, 0]], at[edges[:, 1]]
-    crossing = (a < 0) != (b < 0)
-    edges, share = edges[crossing], (a / np.where(a == b, 1.0, a - b))[crossing]
-    at[edges[share < SNAP, 0]] = 0.0
+    edges = np.where((at[edges[:, 0]] < 0)[:, None], edges, edges[:, ::-1])
+    blocked, free = at[edges].T
+    crossing = (blocked < 0) & (free >= 0)
+    edges, share = edges[crossing], (blocked / np.minimum(blocked - free, -1e-12))[crossing]
     at[edges[share > 1 - SNAP, 1]] = 0.0
-    kept = at[edges[:, 0]] * at[edges[:, 1]] < 0
+    kept = at[edges[:, 1]] > 0
+    share = np.maximum(share, SNAP)
     vertices, faces, came = split_edges(mesh.vertices, mesh.faces, edges[kept], share[kept])
     at = np.concatenate([at, np.zeros(int(kept.sum()))])
     least, most = at[faces].min(axis=1), at[faces].max(axis=1)
