@@ -190,7 +190,7 @@ def test_emergency_commands_are_found_behind_a_line_number_only(wire: Wire) -> N
 
 def test_quick_stop_leaves_the_position_where_it_stopped(wire: Wire) -> None:
     wire.ask("G1 X100 F600\nG1 X0\n", 1.1)
-    assert wire.ask("M410\n") == "ok\n"
+    assert wire.ask("M410\n", 1.1) == "ok\n"
     stopped = wire.ask("M114\n")
     x = float(stopped.split()[0][2:])
     assert 8 < x < 11

@@ -31,6 +31,8 @@ from trunnion_sim.firmware.waits import Steps, Wait
 QUEUE = 4
 """Command lines held, the running one included (BUFSIZE)."""
 AMBIENT = 21.0
+QUICK_STOP = 1.0
+"""s after M410 in which Marlin runs no command: `quickstop_stepper` waits until `cleaning_buffer_counter` is 0."""
 BUSY_EVERY = 2.0
 IDLE_HEATING = 50.0
 """How much faster than the outside an idle machine as fast as possible heats up."""
@@ -174,6 +176,8 @@ class SoftwareMachine:
     @property
     def working(self) -> bool:
         """Whether a command runs that time alone will end."""
+        if self.now < self._held_until:
+            return not self.halted
         return self._handler is not None and not self._wait.user and not self.halted
 
     @property
@@ -183,7 +187,7 @@ class SoftwareMachine:
             return self._out.next_event
         return min(
             self.planner.next_event,
-            self._wait.until if self._handler is not None else math.inf,
+            self._command_event(),
             self._busy_at,
             self._temperature_at,
             self._position_at,
@@ -191,6 +195,11 @@ class SoftwareMachine:
             self._out.next_event,
             self._timed[0].at if self._timed else math.inf,
         )
+
+    def _command_event(self) -> float:
+        if self.now < self._held_until:
+            return self._held_until
+        return self._wait.until if self._handler is not None else math.inf
 
     def trace(self) -> Trace:
         """What the joints did so far, a row per planner block; `line` counts in `executed`, from 1."""
@@ -287,6 +296,7 @@ class SoftwareMachine:
         self.resend_ok_after: float | None = 0.0
         self.refuses_lines = False
         self.dropped_moves = 0
+        self._held_until = -math.inf
         self._busy_at = math.inf
         self._temperature_at = math.inf
         self._position_at = math.inf
@@ -321,6 +331,8 @@ class SoftwareMachine:
         while not self.halted:
             while self.ring and len(self._queue) < QUEUE:
                 self._take_line(self.ring.take_line())
+            if self.now < self._held_until:
+                return
             if self._handler is not None:
                 if not self._resume():
                     return
@@ -401,7 +413,8 @@ class SoftwareMachine:
             self.waits_for_heat = False
             self.waits_for_user = False
         elif code == "M410":
-            self.motion.position = list(self.planner.stop(self.now, self.line))
+            self.motion.stand_at(self.planner.stop(self.now, self.line).tolist())
+            self._held_until = self.now + QUICK_STOP
         elif code == "M876" and answer is not None:
             reason = "FILAMENT_RUNOUT_CONTINUE" if self.prompt_open else "UNKNOWN STATE"
             self.prompt_open = False

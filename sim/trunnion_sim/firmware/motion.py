@@ -1,11 +1,16 @@
 """What the firmware believes of its axes: position, modes, offsets, limits (Marlin 2.1 `motion.cpp`, `G0_G1.cpp`).
 
 Positions are native, in mm and degrees with the filament last; G92 shifts what a person reads and writes, not them.
+Native positions are joints, or with tip control (G43.4) the tip over the part and the angles.
 """
 
 import math
+from collections.abc import Sequence
 
+import numpy as np
 from trunnion_core.profile import MachineProfile
+
+from trunnion_sim.tip_control import tip_control_of
 
 STARTING_FEED = 25.0
 """mm/s before the first F word."""
@@ -36,6 +41,29 @@ class Motion:
         self.feed_factor = 1.0
         self.flow_factor = 1.0
         self.soft_limits = True
+        self.tip = tip_control_of(profile)
+        """None where the firmware has no tip control for the machine."""
+        self.tip_controlled = False
+
+    @property
+    def joints(self) -> list[float]:
+        """Where the joints stand when the last move in the queue has ended, and the filament."""
+        if self.tip is None or not self.tip_controlled:
+            return self.position.copy()
+        joints, _ = self.tip.joints(np.array(self.position[:-1]))
+        return [*joints.tolist(), self.position[-1]]
+
+    def stand_at(self, joints: Sequence[float]) -> None:
+        """The queue ends at these joints and this filament."""
+        self.position = list(joints)
+        if self.tip is not None and self.tip_controlled:
+            self.position[:-1] = self.tip.native(np.array(self.position[:-1])).tolist()
+
+    def control_tip(self, on: bool) -> None:
+        """G43.4 and G49: the place stays, its words change."""
+        joints = self.joints
+        self.tip_controlled = on
+        self.stand_at(joints)
 
     def logical(self) -> list[float]:
         """What M114 shows."""

@@ -32,15 +32,15 @@ def home(machine: "SoftwareMachine", command: Command) -> Steps:
     named = [letter for letter in motion.letters if letter in command.words]
     for letter in named or motion.letters:
         column = motion.columns[letter]
-        goal = motion.position.copy()
+        goal = motion.joints
         goal[column] = motion.home[column]
         speed = min(HOMING_SPEED, 0.5 * float(planner.limits[kernel.MAX_SPEED, column]))
         planner.add(goal, speed, 1.0, machine.line, machine.now)
         yield from synchronize(machine)
-        motion.position[column] = motion.home[column]
+        motion.stand_at(goal)
         motion.shift[column] = 0.0
         motion.homed[column] = True
-        planner.set_joints(motion.position[:-1])
+        planner.set_joints(goal[:-1])
     machine.say(machine.position_report())
 
 
@@ -206,7 +206,7 @@ def _set_limits(machine: "SoftwareMachine", command: Command, row: int, code: st
             limits[row, motion.columns[letter]] = number
             given = True
     if row == kernel.STEPS_PER_UNIT and given:
-        machine.planner.refresh(motion.position)
+        machine.planner.refresh(motion.joints)
     if not command.words:
         words = "".join(f" {x}{v:.2f}" for x, v in zip((*motion.letters, "E"), limits[row], strict=True))
         machine.say(f"echo:  {code}{words}\n")

@@ -63,12 +63,13 @@ class Planner:
         self._running = False
         self._began = 0.0
         self._target: FloatArray = np.zeros(n)
+        self._way: FloatArray = np.zeros(n)
         self._compile()
 
     def _compile(self) -> None:
         """Run the kernels once on a copy, so that the first move does not wait for the compiler."""
         blocks, state, motors = self.blocks.copy(), self.state.copy(), self._motors.copy()
-        kernel.add_block(blocks, self.limits, state, np.ones(self.n), 1.0, 1.0, 0.0)
+        kernel.add_block(blocks, self.limits, state, np.ones(self.n), 1.0, 1.0, 0.0, 0.0, self._way)
         kernel.begin_block(blocks, state, self._profile)
         kernel.part_done(blocks, state, self._profile, 0.0)
         kernel.end_block(blocks, state, motors, self._records[0], 1.0, 0.0)
@@ -83,12 +84,23 @@ class Planner:
         """Blocks that can still be planned."""
         return self.size - 1 - self.moves
 
-    def add(self, target: "Sequence[float]", feed: float, flow: float, line: int, now: float) -> None:
-        """Plan a motion; the queue must not be full."""
+    def add(
+        self,
+        target: "Sequence[float]",
+        feed: float,
+        flow: float,
+        line: int,
+        now: float,
+        length: float = 0.0,
+        way: FloatArray | None = None,
+    ) -> None:
+        """Plan a motion; the queue must not be full. `length` and `way` as in `planner_kernel.add_block`."""
         goal = self._target
         for i, value in enumerate(target):
             goal[i] = value
-        if not kernel.add_block(self.blocks, self.limits, self.state, goal, flow, feed, line):
+        if not kernel.add_block(
+            self.blocks, self.limits, self.state, goal, flow, feed, line, length, self._way if way is None else way
+        ):
             return
         self.moves += 1
         if self._running:

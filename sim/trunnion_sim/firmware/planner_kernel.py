@@ -45,11 +45,20 @@ DURATION, INITIAL_RATE, CRUISE_RATE, FINAL_RATE, ACCELERATE_STEPS, DECELERATE_AF
 
 @njit(cache=True)
 def add_block(
-    blocks: FloatArray, limits: FloatArray, state: FloatArray, target: FloatArray, flow: float, feed: float, line: float
+    blocks: FloatArray,
+    limits: FloatArray,
+    state: FloatArray,
+    target: FloatArray,
+    flow: float,
+    feed: float,
+    line: float,
+    length: float,
+    way: FloatArray,
 ) -> bool:
     """Queue the motion to `target` (n,) in mm, degrees and mm of filament; False where it is too short to be a block.
 
-    `feed` is in mm/s or degrees/s as the F word counts, `flow` the factor on filament.
+    `feed` is in mm/s or degrees/s as the F word counts, `flow` the factor on filament. With a `length` F is read over
+    that, and junction deviation looks at `way` (n,), what the words change; without, both follow from the steps.
     """
     n = limits.shape[1]
     e = n - 1
@@ -78,7 +87,9 @@ def add_block(
     if events < MIN_STEPS:
         return False
     millimeters = math.sqrt(linear2 if linear2 >= 1e-6 else rotary2)
-    if moving_axes == 0:
+    if length > 0:
+        millimeters = length
+    elif moving_axes == 0:
         millimeters = abs(row[STEPS + e]) / limits[STEPS_PER_UNIT, e]
     for i in range(n):
         wanted = min(max(target[i] * limits[STEPS_PER_UNIT, i], -2147483648.0), 2147483647.0)
@@ -125,7 +136,11 @@ def add_block(
     row[ENTRY] = MIN_SPEED * MIN_SPEED
     row[LINE] = line
     if state[JUNCTION_DEVIATION] > 0:
-        corner2 = _junction_deviation(row, limits, state, waiting + int(state[BUSY]))
+        unit = np.empty(n)
+        for i in range(n):
+            change = way[i] if length > 0 else row[STEPS + i] / limits[STEPS_PER_UNIT, i]
+            unit[i] = change / millimeters
+        corner2 = _junction_deviation(row, limits, state, waiting + int(state[BUSY]), unit)
     else:
         corner2 = _classic_jerk(row, limits, state, waiting + int(state[BUSY]), inverse_secs)
     row[MAX_ENTRY] = corner2
@@ -181,13 +196,14 @@ def _classic_jerk(row: FloatArray, limits: FloatArray, state: FloatArray, moves:
 
 
 @njit(cache=True)
-def _junction_deviation(row: FloatArray, limits: FloatArray, state: FloatArray, moves: int) -> float:
-    """Square of the corner speed by centripetal acceleration; all axes in one vector, mm and degrees alike."""
+def _junction_deviation(row: FloatArray, limits: FloatArray, state: FloatArray, moves: int, unit: FloatArray) -> float:
+    """Square of the corner speed by centripetal acceleration; all axes in one vector, mm and degrees alike.
+
+    `unit` (n,) is the change of every axis per mm of the block; it is made a unit vector in place.
+    """
     n = limits.shape[1]
-    unit = np.empty(n)
     length2 = 0.0
     for i in range(n):
-        unit[i] = row[STEPS + i] / limits[STEPS_PER_UNIT, i] / row[MILLIMETERS]
         length2 += unit[i] * unit[i]
     if row[STEPS + n - 1] != 0 or length2 > 1.0 + 1e-9:
         for i in range(n):

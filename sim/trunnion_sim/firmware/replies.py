@@ -47,7 +47,7 @@ CAPABILITIES = (
     ("EXTENDED_M20", 0),
     ("THERMAL_PROTECTION", 1),
     ("MOTION_MODES", 0),
-    ("ARCS", 0),
+    ("ARCS", 1),
     ("BABYSTEPPING", 0),
     ("CHAMBER_TEMPERATURE", 0),
     ("COOLER_TEMPERATURE", 0),
@@ -134,6 +134,8 @@ def settings(motion: "Motion", planner: "Planner") -> str:
         "; Home offset:",
         "  M206" + "".join(f" {letter}0.00" for letter in motion.letters),
     ]
+    if motion.tip is not None:
+        lines += ["; Penta axis:", motion.tip.report()]
     return "".join(f"echo:{line}\n" for line in lines)
 
 

@@ -88,7 +88,7 @@ def _ring(machine: "SoftwareMachine", fault: Fault) -> None:
 def _steps(machine: "SoftwareMachine", fault: Fault) -> None:
     column = machine.motion.columns.get(fault.word("axis"), len(machine.motion.columns) - 1)
     machine.planner.limits[kernel.STEPS_PER_UNIT, column] *= fault.number("factor")
-    machine.planner.refresh(machine.motion.position)
+    machine.planner.refresh(machine.motion.joints)
 
 
 def _unreachable(machine: "SoftwareMachine", fault: Fault) -> None:
