@@ -161,7 +161,9 @@ class ExtruderTable(_Table):
     min_temperature: float = Field(170.0, ge=0, description="Colder than this the firmware refuses to extrude, °C.")
     min_flow: float = Field(0.0, ge=0, description="Slowest steady flow, mm³/s.")
     max_flow: float = Field(12.0, gt=0, description="Fastest flow the hot end can melt, mm³/s.")
-    pressure_advance: float = Field(0.0, ge=0, description="s; 0 turns it off.")
+    pressure_advance: float = Field(
+        0.0, ge=0, description="s, handed to the firmware; at 0 the program leaves the firmware's own setting alone."
+    )
 
 
 class HeaterTable(_Table):

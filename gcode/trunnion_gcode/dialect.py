@@ -28,6 +28,14 @@ class Dialect:
     name: str
     metric: Metric
     planner: Planner
+    tip_words: bool = False
+    """Whether X, Y and Z are the tip over the part, turned back to rotaries at zero, instead of joints."""
+    refuses: Callable[[MachineProfile], str | None] = lambda profile: None
+    """Why a machine cannot be driven in this dialect; None where it can."""
+    enter: tuple[str, ...] = ()
+    """Just before the first move of the program, when the machine is homed and hot."""
+    leave: tuple[str, ...] = ()
+    """Just after the last."""
     inverse_time: bool = False
     """G93: F is one over the minutes that the move takes, and stands on every move."""
     relative_extrusion: bool = True
@@ -48,6 +56,10 @@ class Dialect:
     fan_off: str | None = "M107"
     fan_full: int = 255
     pause: str = "M0"
+    pressure_advance: str | None = None
+    """Turns pressure advance on; takes s."""
+    advance_axes: str = "XY"
+    """Letters of the joints of which one has to move for the firmware to apply it."""
     progress: str | None = "M73 P%d R%d"
     """Takes percent done and minutes left."""
     checksums: bool = True

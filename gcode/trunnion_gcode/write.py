@@ -18,6 +18,7 @@ from trunnion_core.program import MachineProgram
 from trunnion_core.settings import PrintSettings
 
 from trunnion_gcode import header
+from trunnion_gcode.advance import advance_lines
 from trunnion_gcode.comments import comments_by_move
 from trunnion_gcode.dialect import Dialect, find_dialect
 from trunnion_gcode.events import command, commands_by_row, heating
@@ -51,8 +52,8 @@ def write_program(
 
     placement is mm that the slicer added to the model's coordinates. layer_z: mm of a layer's highest point in `part`,
     by layer; without it layers are nominal. The machine must stand at `program.start` when the profile's start code is
-    through. Raises GcodeError (a number that cannot be written, an unknown placeholder, a line that is too long) and
-    ProfileError (no such dialect).
+    through. Raises GcodeError (a number that cannot be written, an unknown placeholder, a line that is too long,
+    pressure advance that the firmware would leave out) and ProfileError (no such dialect).
     """
     dialect = find_dialect(profile.firmware, profile.file)
     lines = program_lines(
@@ -91,7 +92,10 @@ def program_lines(
         *(text for waits, text in heat if not waits),
         *filled(profile.gcode.start, f"{profile.file}: gcode.start", values),
         *(text for waits, text in heat if waits),
+        *advance_lines(moves, profile, dialect),
+        *dialect.enter,
         *_body(program, moves, profile, settings, dialect, layer_z),
+        *dialect.leave,
         *filled(profile.gcode.end, f"{profile.file}: gcode.end", values),
         *dialect.finish,
         *header.tail(settings, profile),

@@ -41,4 +41,5 @@ DIALECT = Dialect(
     shortest=2e-3,
     max_line=4096,
     setup=setup,
+    pressure_advance="SET_PRESSURE_ADVANCE ADVANCE=%s",
 )

@@ -20,4 +20,6 @@ DIALECT = Dialect(
     planner=Planner("marlin", blocks=2, slowest=0.05),
     shortest=2 * SHORTEST_LINEAR,
     minimum_steps=6,
+    pressure_advance="M900 K%s",
+    advance_axes="XYZ",
 )

@@ -17,4 +17,5 @@ DIALECT = Dialect(
     shortest=2e-3,
     minimum_speed=0.5,
     allow_slower="M203 I%s",
+    pressure_advance="M572 D0 S%s",
 )
