@@ -49,6 +49,9 @@ class MachineProgram:
     cruise: FloatArray = field(default_factory=lambda: np.zeros(0))
     """(n,) s that the row would take at the speed asked of a firmware that makes its own ramps: feed words come from
     this, the time of the print from `duration`. Empty where nobody worked it out."""
+    tip: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    """(n + 1, 3) mm, `part`: the tip at `start` and at the end of every row, for firmware that is told tips instead of
+    joints. Empty where nobody worked it out."""
 
     def __post_init__(self) -> None:
         n, k = self.joints.shape
@@ -69,9 +72,11 @@ class MachineProgram:
             check_array(name, getattr(self, name), (n,))
         if self.cruise.size:
             check_array("cruise", self.cruise, (n,))
+        if self.tip.size:
+            check_array("tip", self.tip, (n + 1, 3))
         if n and self.duration.min() < 0:
             raise ValueError(f"duration: row {int(self.duration.argmin())} is negative")
-        freeze(self.joints, self.start, self.cruise, *(getattr(self, name) for name in per_row))
+        freeze(self.joints, self.start, self.cruise, self.tip, *(getattr(self, name) for name in per_row))
 
     def __len__(self) -> int:
         return len(self.joints)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.errors import GcodeError, ProfileError
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
 from trunnion_core.roles import Role
@@ -28,9 +29,11 @@ class Moves:
     row: IntArray
     """(m,) rows of the program, rising."""
     joint_ticks: IntArray
-    """(m, k)."""
+    """(m, k) of the words under the joints' letters."""
     step: FloatArray
-    """(m, k) mm or degrees that each joint word changes by."""
+    """(m, k) mm or degrees that each joint moves: what its word changes by, where words are joints."""
+    word_step: FloatArray
+    """(m, k) mm or degrees that each word changes by."""
     filament_ticks: IntArray
     """(m,)."""
     filament: FloatArray
@@ -48,17 +51,21 @@ class Moves:
 
 
 def make_moves(program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> Moves:
-    """Round, merge and measure. GcodeError names the row and joint of a number that cannot be written."""
+    """Round, merge and measure.
+
+    GcodeError names the row and joint of a number that cannot be written, ProfileError says why the machine cannot be
+    driven in this dialect.
+    """
+    reason = dialect.refuses(profile)
+    if reason is not None:
+        raise ProfileError(profile.file, [f"machine.firmware: {reason}"])
     decimals = joint_decimals(profile)
-    shown = program.joints * profile.to_shown
+    values, first = _values(program, profile, dialect)
     words = np.stack(
-        [ticks(joint.letter, shown[:, k], decimals[k]) for k, joint in enumerate(profile.joints)], axis=1
+        [ticks(joint.letter, values[:, k], decimals[k]) for k, joint in enumerate(profile.joints)], axis=1
     ).reshape(len(program), len(profile.joints))
     start = np.array(
-        [
-            ticks(f"start {joint.letter}", np.array([joint.shown(program.start[k])]), decimals[k])[0]
-            for k, joint in enumerate(profile.joints)
-        ]
+        [ticks(f"start {joint.letter}", first[k : k + 1], decimals[k])[0] for k, joint in enumerate(profile.joints)]
     )
     kept = _written(program, words, start)
     merged_deviation = np.zeros(len(program))
@@ -66,6 +73,21 @@ def make_moves(program: MachineProgram, profile: MachineProfile, dialect: Dialec
         if not _merge_once(kept, merged_deviation, program, words, start, profile, dialect):
             break
     return _measured(kept, program, words, start, profile, dialect)
+
+
+def _values(program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> tuple[FloatArray, FloatArray]:
+    """(n, k) numbers under the joints' letters at the rows' ends, and (k,) at the start: mm and degrees."""
+    values, first = program.joints * profile.to_shown, program.start * profile.to_shown
+    if not dialect.tip_words:
+        return values, first
+    if len(program.tip) != len(program) + 1:
+        raise GcodeError(f"{dialect.name} is told tips, but the program has none: MachineProgram.tip is empty")
+    # With all rotaries at zero the tip stands at profile.tip plus the linear words: those words reach the tip's place.
+    world = program.tip + profile.origin - profile.tip
+    for k, joint in enumerate(profile.joints):
+        if not joint.rotary:
+            values[:, k], first[k] = world[1:, "XYZ".index(joint.letter)], world[0, "XYZ".index(joint.letter)]
+    return values, first
 
 
 def joint_decimals(profile: MachineProfile) -> list[int]:
@@ -156,7 +178,10 @@ def _measured(
     rows = np.flatnonzero(kept)
     joint_ticks = words[rows]
     scale = 10.0 ** np.array(joint_decimals(profile))
-    step = np.diff(joint_ticks, axis=0, prepend=start[None]) / scale
+    word_step = np.diff(joint_ticks, axis=0, prepend=start[None]) / scale
+    step = word_step
+    if dialect.tip_words:
+        step = np.diff(program.joints[rows], axis=0, prepend=program.start[None]) * profile.to_shown
     feeding = np.flatnonzero(~np.isin(program.role[rows], (Role.TRAVEL, Role.LINK)))
     filament_ticks = np.zeros(len(rows), dtype=np.int64)
     fed = np.diff(np.cumsum(program.filament)[rows[feeding]], prepend=0.0)
@@ -168,11 +193,12 @@ def _measured(
         row=rows,
         joint_ticks=joint_ticks,
         step=step,
+        word_step=word_step,
         filament_ticks=filament_ticks,
         filament=filament,
         seconds=np.diff(np.cumsum(program.duration)[rows], prepend=0.0),
         asked=np.diff(np.cumsum(asked)[rows], prepend=0.0),
-        metric=dialect.metric(step[:, ~rotary], step[:, rotary], filament),
+        metric=dialect.metric(word_step[:, ~rotary], word_step[:, rotary], filament),
         width=_mean_over_merged(program.width, program.tip_length, rows),
         height=_mean_over_merged(program.height, program.tip_length, rows),
     )

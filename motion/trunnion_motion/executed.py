@@ -151,7 +151,9 @@ class _Drive:
 
 def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> _Drive:
     extruder, planner = profile.extruder, profile.planner
-    steps = np.column_stack([moves.step, moves.filament])
+    # LinuxCNC limits the axes of the world it is told, not the joints.
+    of_words = dialect.planner.corners == "blend"
+    steps = np.column_stack([moves.word_step if of_words else moves.step, moves.filament])
     share = steps / moves.metric[:, None]
     speed = np.append(profile.array("speed") * profile.to_shown, extruder.speed)
     acceleration = np.append(profile.array("acceleration") * profile.to_shown, extruder.acceleration)

@@ -72,7 +72,8 @@ def plan_motion(toolpath: Toolpath, profile: MachineProfile, settings: PrintSett
         _, fastest = tip_window(rows.width, rows.height, profile, settings.extrusion_multiplier)
         rows = replace(rows, tip_speed=np.minimum(rows.tip_speed, fastest))
 
-    tip_length = rows.tip_lengths(chain.forward(home[None])[0][0])
+    home_tip = chain.forward(home[None])[0]
+    tip_length = rows.tip_lengths(home_tip[0])
     asked, ideal = _timed(rows, tip_length, profile, settings, home)
     program = MachineProgram(
         start=home,
@@ -88,6 +89,7 @@ def plan_motion(toolpath: Toolpath, profile: MachineProfile, settings: PrintSett
         source=rows.source,
         events=events_for(rows.layer, profile, settings),
         cruise=asked,
+        tip=np.concatenate([home_tip, rows.points]),
     )
     done = executed(program, ideal, profile, find_dialect(profile.firmware, profile.file))
     law = done.law

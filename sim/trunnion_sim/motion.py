@@ -17,6 +17,7 @@ from trunnion_core.profile import MachineProfile
 from trunnion_sim import motion_kernel as kernel
 from trunnion_sim.reader import Block
 from trunnion_sim.rules import Rules
+from trunnion_sim.tip_rows import joints_of_tips
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,8 @@ class Motion:
     code_count: Counter[tuple[str, int]]
     dropped: dict[str, list[int]] = field(default_factory=dict)
     """Lines whose motion could not be understood, by reason."""
+    of_tip: BoolArray = field(default_factory=lambda: np.zeros(0, np.bool_))
+    """(n,) whether the row named the tip instead of joints; empty where none did."""
 
     def __len__(self) -> int:
         return len(self.line)
@@ -86,10 +89,14 @@ class Motion:
         return np.concatenate([self.start[None], self.joints[:-1]])
 
 
-KEPT = {
-    ("M", n * 10)
-    for n in (0, 1, 82, 83, 104, 109, 112, 116, 140, 190, 191, 200, 201, 203, 204, 205, 302, 566, 568, 600)
-} | {("G", n * 10) for n in (4, 10, 20, 28, 29, 90, 91, 92, 93, 94)}
+KEPT = (
+    {
+        ("M", n * 10)
+        for n in (0, 1, 82, 83, 104, 109, 112, 116, 140, 190, 191, 200, 201, 203, 204, 205, 302, 566, 568, 600)
+    }
+    | {("G", n * 10) for n in (4, 10, 20, 28, 29, 49, 90, 91, 92, 93, 94)}
+    | {("G", 434)}
+)
 """Non-motion commands whose words matter later."""
 
 
@@ -127,11 +134,12 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
             if hit.size:
                 dropped.setdefault(reason, []).extend(hit.tolist())
     joined = kernel.joined(parts)
+    of_tip = _of_tip(commands, joined.kind, rules)
     return Motion(
         line=joined.line,
         kind=joined.kind,
         start=np.zeros(k),
-        joints=joined.joints / profile.to_shown,
+        joints=joints_of_tips(profile, joined.joints / profile.to_shown, of_tip),
         filament=joined.filament,
         feed=joined.feed,
         inverse=(joined.flags & kernel.INVERSE) > 0,
@@ -143,7 +151,18 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
         code_first_line=first_line,
         code_count=count,
         dropped=dropped,
+        of_tip=of_tip if of_tip.any() else np.zeros(0, np.bool_),
     )
+
+
+def _of_tip(commands: list[Command], kind: NDArray[np.uint8], rules: Rules) -> BoolArray:
+    """(n,) rows whose X, Y and Z are the tip; homing always names joints."""
+    named = np.full(len(kind), rules.tip_words == "always")
+    if rules.tip_words == "G43.4":
+        for command in commands:
+            if command.name in ("G43.4", "G49"):
+                named[command.row :] = command.name == "G43.4"
+    return np.asarray(named & (kind != kernel.HOME))
 
 
 def _collect(

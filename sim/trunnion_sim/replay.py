@@ -14,9 +14,12 @@ from trunnion_sim import motion_kernel, replay_kernel, toolhead_kernel
 from trunnion_sim.limits import Limits
 from trunnion_sim.motion import Motion
 from trunnion_sim.rules import Rules
+from trunnion_sim.tip_rows import world_steps
 
 GRBL_DEVIATION = 0.01
 """mm: grblHAL's own setting $11, where the profile gives no junction deviation."""
+NO_WORD = 1e-7
+"""mm: smaller than the last decimal of any word."""
 WITHOUT_F = 25.0
 """mm/s before the first F, as Klipper has it."""
 BLEND_TOLERANCE = 0.01
@@ -122,6 +125,11 @@ def _law(
         blocks = max(rules.least_blocks, profile.planner.blocks)
         law = toolhead_kernel.grbl(delta, feed, motion.inverse, stops, *first, across, blocks)
     elif rules.corners == "linuxcnc":
+        if motion.of_tip.size:
+            steps = _tip_steps(motion, profile)
+            for place, letter in enumerate("XYZ"):
+                column = profile.letters.index(letter)
+                delta[:, column] = np.where(motion.of_tip, steps[:, place], delta[:, column])
         law = toolhead_kernel.linuxcnc(
             delta, np.append(linear, False), feed, motion.inverse, stops, *first, BLEND_TOLERANCE
         )
@@ -180,8 +188,23 @@ def _marlin_or_duet(
         max(rules.least_blocks, profile.planner.blocks),
         rules.slowest,
         rules.starts_at_corner_speed,
+        _tip_lengths(motion, profile),
     )
     return law
+
+
+def _tip_steps(motion: Motion, profile: MachineProfile) -> FloatArray:
+    """(n, 3) mm that rows move the tip over the part, motion smaller than any word taken for none."""
+    steps = world_steps(profile, motion.start, motion.joints)
+    return np.where(np.abs(steps) < NO_WORD, 0.0, steps)
+
+
+def _tip_lengths(motion: Motion, profile: MachineProfile) -> FloatArray:
+    """(n,) mm over which F is read where the row named the tip; -1 elsewhere."""
+    length = np.full(len(motion), -1.0)
+    if motion.of_tip.size:
+        length[motion.of_tip] = np.linalg.norm(_tip_steps(motion, profile), axis=1)[motion.of_tip]
+    return length
 
 
 def samples(motion: Motion, rows: IntArray, fractions: FloatArray) -> FloatArray:

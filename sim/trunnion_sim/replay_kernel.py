@@ -41,6 +41,7 @@ def plan(
     blocks: int,
     slowest: float,
     starts_at_corner: bool,
+    tip_length: _F,
 ) -> tuple[_F, _F, _F, _F, _F, _F, _F]:
     """Length, asked speed, entry, cruise, exit, acceleration and duration of every row."""
     n, columns = delta.shape
@@ -60,6 +61,8 @@ def plan(
                     straight += delta[i, j] ** 2
                 else:
                     turned += delta[i, j] ** 2
+        if tip_length[i] >= 0:
+            straight = tip_length[i] ** 2
         d = math.sqrt(straight) if straight > 0 else (math.sqrt(turned) if turned > 0 else abs(delta[i, k]))
         moves = straight > 0 or turned > 0
         kind[i] = (1 if moves else 0) | (2 if straight > 0 else 0) | (4 if delta[i, k] != 0 else 0)

@@ -39,6 +39,8 @@ class Rules:
     """Whether a move from rest starts with the corner speed at once (classic jerk) instead of from zero."""
     filament: str = "E"
     """Letter of the filament."""
+    tip_words: Literal["never", "G43.4", "always"] = "never"
+    """When X, Y and Z are the tip over the part, as with the rotaries at zero, instead of joints."""
 
 
 def find_rules(name: str, source: str = "profile") -> Rules:

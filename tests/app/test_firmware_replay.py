@@ -1,21 +1,29 @@
 """For each firmware the tip moves as planned: the written file, replayed under that firmware's own rules."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
 from trunnion.agreement import agreement, on_firmware
+from trunnion_core.errors import ProfileError
 from trunnion_core.profile import load_profile
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
-from trunnion_gcode.dialect import dialect_names
+from trunnion_gcode.dialect import dialect_names, find_dialect
+from trunnion_gcode.moves import make_moves
+from trunnion_gcode.write import write_program
 from trunnion_motion.plan import plan_motion
+from trunnion_sim.judge import context_of
 from trunnion_sim.rules import firmware_names
 
 SETTINGS = PrintSettings(layer_height=0.3, extrusion_width=0.4)
 MACHINES = ("generic_ab_cradle", "open5x_prusa_i3", "rep5x_ender3")
 FIRMWARES = sorted(set(dialect_names()) & set(firmware_names()))
+TIP_FIRMWARES = ("linuxcnc_tcp", "marlin_tcp")
+PAIRS = [(firmware, machine) for firmware in FIRMWARES if firmware not in TIP_FIRMWARES for machine in MACHINES]
+PAIRS += [(firmware, "open5x_voron0") for firmware in FIRMWARES]
 
 
 def dome():
@@ -58,8 +66,7 @@ TOOLPATHS = {"dome": dome(), "propeller": propeller()}
 
 
 @pytest.mark.parametrize("shape", TOOLPATHS)
-@pytest.mark.parametrize("machine", MACHINES)
-@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize(("firmware", "machine"), PAIRS)
 def test_the_tip_moves_as_planned(firmware, machine, shape):
     profile = on_firmware(load_profile(machine), firmware)
     found = agreement(plan_motion(TOOLPATHS[shape], profile, SETTINGS), profile, SETTINGS)
@@ -70,6 +77,69 @@ def test_the_tip_moves_as_planned(firmware, machine, shape):
 
 def test_every_dialect_can_be_replayed():
     assert set(dialect_names()) == set(firmware_names())
+
+
+@pytest.mark.parametrize("firmware", TIP_FIRMWARES)
+@pytest.mark.parametrize(
+    ("machine", "why"), [("generic_ab_cradle", "rotary joints are A and B"), ("generic_3axis", "none")]
+)
+def test_machines_without_tip_control_are_refused(firmware, machine, why):
+    profile = on_firmware(load_profile(machine), firmware)
+    flat = dataclasses.replace(TOOLPATHS["dome"], tool_axes=np.tile([0.0, 0.0, 1.0], (len(TOOLPATHS["dome"]), 1)))
+    with pytest.raises(ProfileError, match=why):
+        plan_motion(flat, profile, SETTINGS)
+
+
+def moved_table(tip_x=3.0):
+    """A table whose axes do not meet, a tip and an origin off zero: every offset counts."""
+    voron = load_profile("open5x_voron0")
+    points = {"B": np.array([4.0, 0.0, -7.0]), "C": np.array([1.5, -2.0, 0.0])}
+    joints = tuple(dataclasses.replace(j, point=points[j.letter]) if j.rotary else j for j in voron.joints)
+    tip, origin = np.array([tip_x, -1.0, 2.0]), np.array([2.0, 1.0, 0.5])
+    return dataclasses.replace(voron, joints=joints, tip=tip, origin=origin)
+
+
+def test_world_words_are_those_of_linuxcncs_kinematics(tmp_path):
+    """trtfuncs.c with the pins that the header names turns the words back into the joints."""
+    profile = on_firmware(moved_table(), "linuxcnc_tcp")
+    program = plan_motion(TOOLPATHS["dome"], profile, SETTINGS).program
+    file = tmp_path / "dome.ngc"
+    write_program(program, profile, SETTINGS, title="dome", out=file)
+    lines = file.read_text().splitlines()
+    pin = {m[1]: float(m[2]) for m in (re.match(r"; setp xyzbc-trt-kins\.(\S+) (\S+)", line) for line in lines) if m}
+    moves = make_moves(program, profile, find_dialect(profile.firmware))
+    words = moves.joint_ticks / 10.0**4
+    world = np.stack([words[:, profile.letters.index(letter)] for letter in "XYZ"], axis=1)
+    b, c = (np.radians(words[:, profile.letters.index(letter)]) for letter in "BC")
+    around = np.array([pin["x-rot-point"], pin["y-rot-point"], pin["z-rot-point"]])
+    offset = np.array([pin["x-offset"], 0.0, pin["z-offset"]])
+    p = world - around
+    p = np.stack(
+        [np.cos(c) * p[:, 0] - np.sin(c) * p[:, 1], np.sin(c) * p[:, 0] + np.cos(c) * p[:, 1], p[:, 2]], axis=1
+    )
+    p -= offset
+    p = np.stack(
+        [np.cos(b) * p[:, 0] + np.sin(b) * p[:, 2], p[:, 1], np.cos(b) * p[:, 2] - np.sin(b) * p[:, 0]], axis=1
+    )
+    reached = p + offset + around
+    linear = [profile.letters.index(letter) for letter in "XYZ"]
+    assert np.abs(np.degrees(b)).max() > 5
+    assert np.ptp(np.degrees(c)) > 90
+    np.testing.assert_allclose(reached, program.joints[moves.row][:, linear], atol=5e-4)
+    assert pin["conventional-directions"] == 0
+
+
+@pytest.mark.parametrize("firmware", TIP_FIRMWARES)
+def test_the_judge_finds_the_joints_of_tip_words(firmware, tmp_path):
+    profile = on_firmware(moved_table(), firmware)
+    program = plan_motion(TOOLPATHS["dome"], profile, SETTINGS).program
+    file = tmp_path / "dome.gcode"
+    write_program(program, profile, SETTINGS, title="dome", out=file)
+    context = context_of(file, profile)
+    rows = make_moves(program, profile, find_dialect(firmware)).row
+    executed = context.motion.joints[~context.homing][: len(rows)]
+    np.testing.assert_allclose(executed, program.joints[rows], atol=5e-4)
+    np.testing.assert_allclose(context.points[~context.homing][: len(rows)], program.tip[rows + 1], atol=2e-4)
 
 
 def test_feed_from_durations_is_noticed():

@@ -1,0 +1,40 @@
+"""Marlin's five-axis fork (DerAndere1/Marlin, PENTA_AXIS_TRT) with tip control: G43.4 before the print, G49 after.
+
+X, Y and Z are the tip over the part, in the coordinates that the joints have with the tables at zero; A or B and C stay
+joint angles. F is the speed of the tip over the part (`motion.cpp`, `line_to_destination_kinematic`), and the fork cuts
+moves that turn a table into pieces of 5 ms. Its branches disagree on the signs of the rotary words, so the signs are
+the profile's and have to be checked on the machine.
+"""
+
+import functools
+
+from trunnion_core.profile import MachineProfile
+
+from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.dialects.marlin import SHORTEST_LINEAR
+from trunnion_gcode.metrics import linear_first
+from trunnion_gcode.planner import Planner
+from trunnion_gcode.tables import pivots, table_problem
+from trunnion_gcode.words import number
+
+
+def setup(profile: MachineProfile) -> tuple[str, ...]:
+    """Which geometry the firmware must have been told."""
+    names = ("X", "Y", "Z", "I", "J", "K")
+    zero, offset = pivots(profile)
+    words = " ".join(f"{name}{number(name, v, 4)}" for name, v in zip(names, (*zero, *offset), strict=True))
+    return (f"; the firmware must have been told M665 {words}",)
+
+
+DIALECT = Dialect(
+    name="marlin_tcp",
+    metric=functools.partial(linear_first, threshold=SHORTEST_LINEAR),
+    planner=Planner("marlin", blocks=2, slowest=0.05),
+    tip_words=True,
+    refuses=table_problem,
+    enter=("G43.4",),
+    leave=("G49",),
+    shortest=2 * SHORTEST_LINEAR,
+    minimum_steps=6,
+    setup=setup,
+)
