@@ -1,10 +1,10 @@
 """Tool centre point control of Marlin's five-axis fork: which machines have it, and what M665 sets.
 
 DerAndere1/Marlin knows a table on a tilting table (`penta_axis_trt.cpp`) and a tilting head over a turning table
-(`penta_axis_ht.cpp`). With G43.4 the words X, Y, Z are the tip over the part, the rotary words stay joint angles, F is
-the speed of the tip, and a move that turns a rotary is cut into `segments_per_second` pieces (`motion.cpp`,
-`line_to_destination_kinematic`). The signs and lines of the rotary joints come from the profile: the branches of the
-fork disagree on them.
+(`penta_axis_ht.cpp`). With G43.4 the words X, Y, Z are the tip over the part, in the coordinates that the joints have
+with the rotaries at zero; the rotary words stay joint angles, F is the speed of the tip, and a move that turns a rotary
+is cut into `segments_per_second` pieces (`motion.cpp`, `line_to_destination_kinematic`). The signs and lines of the
+rotary joints come from the profile: the branches of the fork disagree on them.
 """
 
 from collections.abc import Mapping
@@ -33,21 +33,22 @@ class TipControl:
         self._tilting = tool[0] if tool else first
         self._turning = next(column for column in profile.rotary if column != self._tilting)
         self.segments_per_second = SEGMENTS_PER_SECOND
+        place = np.array([profile.letters.index(letter) for letter in "XYZ"])
+        axis = np.array([joint.axis for joint in joints])
+        tool_side = np.array([joint.side == "tool" for joint in joints])
+        directions = np.ascontiguousarray((axis[place] * np.where(tool_side[place], 1.0, -1.0)[:, None]).T)
         self.geometry = Geometry(
             rotary=np.array([joint.rotary for joint in joints]),
-            tool=np.array([joint.side == "tool" for joint in joints]),
-            axis=np.array([joint.axis for joint in joints]),
+            tool=tool_side,
+            axis=axis,
             point=np.array([joint.point for joint in joints]),
             tip=np.array(profile.tip),
-            origin=np.array(profile.origin),
+            directions=directions,
+            inverse=np.linalg.inv(directions),
             low=np.array([joint.shown(joint.min) for joint in joints]),
             high=np.array([joint.shown(joint.max) for joint in joints]),
-            place=np.array([profile.letters.index(letter) for letter in "XYZ"]),
+            place=place,
         )
-        g = self.geometry
-        sign = np.where(g.tool[g.place], 1.0, -1.0)
-        self._directions = (g.axis[g.place] * sign[:, None]).T
-        self._inverse_directions = np.linalg.inv(self._directions)
 
     def joints(self, native: FloatArray) -> tuple[FloatArray, bool]:
         """(k,) joints that take the tip to `native` (k,), mm and degrees, and whether all are in their travel."""
@@ -64,13 +65,13 @@ class TipControl:
     def zero_point(self) -> FloatArray:
         """(3,) values of X, Y, Z that bring the tip to the turning table's axis, rotaries at zero."""
         g = self.geometry
-        return np.asarray(self._inverse_directions @ (g.point[self._turning] - g.tip))
+        return np.asarray(g.inverse @ (g.point[self._turning] - g.tip))
 
     @property
     def joint_offset(self) -> FloatArray:
         """(3,) mm along X, Y, Z from the turning axis to the tilting axis."""
         g = self.geometry
-        return np.asarray(self._inverse_directions @ (g.point[self._tilting] - g.point[self._turning]))
+        return np.asarray(g.inverse @ (g.point[self._tilting] - g.point[self._turning]))
 
     def set(self, words: Mapping[str, float | None]) -> None:
         """M665: S segments a second; X Y Z the rotary zero point and I J K the joint offset, or Z the head's arm."""
@@ -92,8 +93,8 @@ class TipControl:
                 number = words.get(letter)
                 if number is not None:
                     values[column] = number
-        g.point[self._turning] = g.tip + self._directions @ zero
-        g.point[self._tilting] = g.point[self._turning] + self._directions @ offset
+        g.point[self._turning] = g.tip + g.directions @ zero
+        g.point[self._tilting] = g.point[self._turning] + g.directions @ offset
 
     def report(self) -> str:
         """M665 without words, as M503 shows it."""

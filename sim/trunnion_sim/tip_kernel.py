@@ -1,6 +1,7 @@
 """Tip words and joint words into each other, one pose at a time, compiled: what firmware does with G43.4 on.
 
-A *native* row holds the tip over the part under the letters X, Y, Z and the joint angles under the rotary letters. With
+A *native* row holds the tip over the part under the letters X, Y, Z, as the joint values that bring the tip there with
+the rotaries at zero, and the joint angles under the rotary letters; with the angles at zero it is the joints. With
 the angles known the linear joints follow from one 3x3 system: the tool side and the work side must carry the tip and
 the point of the part to the same place, and each linear joint moves one of them along its axis as the rotary joints
 before it have turned it. All in mm and degrees, in profile order.
@@ -36,7 +37,11 @@ class Geometry(NamedTuple):
     point: _F
     """(k, 3) mm, machine frame, all joints at zero."""
     tip: _F
-    origin: _F
+    """(3,)."""
+    directions: _F
+    """(3, 3) columns: how the tip moves over the part with X, Y and Z, rotaries at zero."""
+    inverse: _F
+    """(3, 3)."""
     low: _F
     """(k,) mm and degrees."""
     high: _F
@@ -53,7 +58,9 @@ def to_joints(g: Geometry, native: _F, joints: _F) -> bool:
     matrix = np.zeros((3, 3))
     for c in range(3):
         sides[1, c] = g.tip[c]
-        sides[0, c] = g.origin[c] + native[g.place[c]]
+        sides[0, c] = g.tip[c]
+        for d in range(3):
+            sides[0, c] += g.directions[c, d] * native[g.place[d]]
     for j in range(k - 1, -1, -1):
         if g.rotary[j]:
             side = 1 if g.tool[j] else 0
@@ -135,7 +142,9 @@ def to_native(g: Geometry, joints: _F, native: _F) -> None:
     for j in range(k):
         native[j] = joints[j]
     for c in range(3):
-        native[g.place[c]] = p[c] - g.origin[c]
+        native[g.place[c]] = 0.0
+        for d in range(3):
+            native[g.place[c]] += g.inverse[c, d] * (p[d] - g.tip[d])
 
 
 @njit(cache=True)
