@@ -34,7 +34,7 @@ MALFORMED = 1024
 HUGE_NUMBER = 1e7
 
 _TEXT_CODES = np.array(
-    [1170, 1180, 230, 280, 300, 320, 330, 160, 9280, 2910, 2920, 980, 360, 370, 4860, 8620], np.int64
+    [0, 10, 1150, 1170, 1180, 230, 280, 300, 320, 330, 160, 9280, 2910, 2920, 980, 360, 370, 4860, 8620], np.int64
 )
 """M codes (times ten) whose rest of the line is free text."""
 

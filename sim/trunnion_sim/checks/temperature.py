@@ -15,7 +15,9 @@ CODES = {
 }
 
 NOZZLE_WAITS = {"M109"}
-NOZZLE_SETS = {"M104", "M568", "G10"}
+NOZZLE_SETS = {"M104"}
+NOZZLE_SETS_REPRAP = {"M568", "G10"}
+"""Only in RepRapFirmware: elsewhere G10 retracts."""
 BED = {"M140", "M190"}
 
 
@@ -26,10 +28,11 @@ def check(context: Context) -> Iterator[Finding]:
     hot = np.zeros(len(context.motion), dtype=bool)
     target = 0.0
     state = allowed = False
+    sets = NOZZLE_WAITS | NOZZLE_SETS | (NOZZLE_SETS_REPRAP if context.rules.name == "reprapfirmware" else set())
     for command in context.motion.commands:
         name = command.name
         value = _temperature(command)
-        if name in NOZZLE_WAITS | NOZZLE_SETS and value is not None:
+        if name in sets and value is not None:
             target = value
             if target < least:
                 state = False
