@@ -26,8 +26,8 @@ from trunnion_sim.collision.scene import BLOCK, CELL, Scene
 from trunnion_sim.collision.solids import signed_distance
 
 PRESS = 0.1 + 1e-4
-"""mm above the plane of the tip up to which plastic may touch the nozzle: a bead's own squeeze, its soft neighbours; and
-the rounding of heights, so that a step down by exactly 0.1 is not decided by it."""
+"""mm above the plane of the tip up to which plastic may touch the nozzle: a bead's own squeeze, its soft neighbours;
+and the rounding of heights, so that a step down by exactly 0.1 is not decided by it."""
 SMALLEST_STEP = 0.05
 """mm that no point of a body moves beyond between two poses that decide."""
 FAR = 1e9
