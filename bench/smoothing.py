@@ -2,10 +2,11 @@
 
     python bench/smoothing.py [--picture]
 
-Printed for the free-form part and the propeller on four machines, without smoothing, with the default 2 degrees, and
-with 5 degrees of axis tolerance on top. Rotary acceleration is what the wanted tip speed would ask of the joints (p99.9
-over rows that are no corner of the path). --picture draws docs/pictures/propeller_on_platter.png: the planned tip speed
-over the propeller on a tilt-and-platter machine, and its platter's turn along the path, before and after.
+Printed for the free-form part and the propeller on four machines: without smoothing, with the default 2 degrees, with
+1 degree and 1 of axis tolerance (so at most 2 from the normals, pole included), and with 5 degrees of tolerance.
+Rotary acceleration is what the wanted tip speed would ask of the joints (p99.9 over rows that are no corner of the
+path). --picture draws docs/pictures/propeller_on_platter.png: the planned tip speed over the propeller on a
+tilt-and-platter machine, and how fast its rotary joints turn along the path, before and after.
 """
 
 import argparse
@@ -30,6 +31,7 @@ MACHINES = ("generic_ab_cradle", "open5x_voron0", "open5x_prusa_i3", "rep5x_ende
 CASES = {
     "plain": {"nonplanar_smoothing": 0.0},
     "smooth": {},
+    "1 + 1 degrees": {"nonplanar_smoothing": 1.0, "nonplanar_axis_tolerance": 1.0},
     "smooth, 5 degrees": {"nonplanar_axis_tolerance": 5.0},
 }
 NONPLANAR = (Role.NONPLANAR_OUTER_WALL, Role.NONPLANAR_INNER_WALL, Role.NONPLANAR_INFILL)
@@ -88,12 +90,12 @@ def rotary_demand(done: PlanResult, profile: MachineProfile, rows: BoolArray) ->
         rows[2:] & rows[1:-1] & (cosine > np.cos(np.radians(CORNER_DEG))) & (length[1:-1] > 1e-3) & (length[2:] > 1e-3)
     )
     change = np.abs(np.diff(rates(done)[1:, profile.rotary], axis=0)) / (0.5 * (length[1:-1] + length[2:]))[:, None]
-    return np.degrees(np.percentile((change * program.tip_speed[2:, None] ** 2)[inner], 99.9, axis=0))
+    return np.asarray(np.degrees(np.percentile((change * program.tip_speed[2:, None] ** 2)[inner], 99.9, axis=0)))
 
 
 def draw(machine: str) -> None:
     profile = load_profile(machine)
-    figure, axes = plt.subplots(3, 3, figsize=(11, 8), height_ratios=[2.4, 1, 1], constrained_layout=True)
+    figure, axes = plt.subplots(3, len(CASES), figsize=(14, 8), height_ratios=[2.4, 1, 1], constrained_layout=True)
     for column, case in zip(axes.T, CASES, strict=True):
         done = planned("propeller", profile, case)
         rows = nonplanar(done)
@@ -112,7 +114,7 @@ def draw(machine: str) -> None:
             row.set_ylabel(f"{profile.letters[rotary]} (degrees/mm)", fontsize=8)
             row.set_ylim(*((-15, 15) if rotary == profile.rotary[0] else (-60, 60)))
         column[2].set_xlabel("tip path (mm)", fontsize=8)
-    figure.colorbar(dots, ax=axes[0, 2], label="tip speed (mm/s)")
+    figure.colorbar(dots, ax=axes[0, -1], label="tip speed (mm/s)")
     figure.savefig(PICTURES / "propeller_on_platter.png", dpi=70)
     plt.close(figure)
 
