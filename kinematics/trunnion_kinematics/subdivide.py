@@ -28,7 +28,8 @@ POLE_ANGLE = 1e-8
 """rad to the pole below which rotary 1 is interpolated, not solved for."""
 
 MARGIN = 0.02
-"""rad. How far rotary 1, solved in the middle of a piece, may lie outside its two ends and still belong to them."""
+"""rad. How far rotary 1, solved in the middle of a piece, may lie outside its two ends and still belong to them; not at
+all on a piece that crosses between branches, or halving would creep round the pole to a turn by half a circle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +163,9 @@ def _middle_joints(
     joints = np.where((away[1] < away[0])[:, None], solutions[1], solutions[0])
     first = ends[:, :, rotary[0]]
     low, high = first.min(axis=0), first.max(axis=0)
-    margin = MARGIN + 0.25 * (high - low)
+    pole = turns[:, :, 1].mean(axis=0)
+    crossing = ((ends[:, :, rotary[1]] - pole) > 0).sum(axis=0) == 1
+    margin = np.where(crossing, 0.0, MARGIN + 0.25 * (high - low))
     belongs = (joints[:, rotary[0]] >= low - margin) & (joints[:, rotary[0]] <= high + margin)
     belongs &= np.linalg.norm(np.cross(tool_axes, chain.rotary_axes[0]), axis=1) > POLE_ANGLE
     other = ~belongs

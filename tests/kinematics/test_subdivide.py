@@ -91,3 +91,22 @@ def test_a_machine_without_rotaries_needs_no_rows():
     points = np.array([[0.0, 0, 0], [50, 50, 20]])
     fine = subdivide(chain, points, np.tile([0.0, 0, 1], (2, 1)), chain.at_angles(points, np.empty((2, 0))), 0.01)
     assert fine.source.tolist() == [0, 1]
+
+
+def test_a_step_from_beside_the_pole_to_its_far_side_does_not_turn_the_platter_round(machines):
+    """Halving must not creep from one branch to the other: the table would swing the tip through the part."""
+    tilt, azimuth = np.radians([0.391, 3.012]), np.radians([-96.0, -2.1])
+    tool_axes = np.stack([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)], axis=1)
+    points = np.array([[-17.426, -1.585, 9.2], [-17.237, -1.585, 9.195]])
+    chain = JointChain.from_profile(machines["tilt_then_platter"])
+    near, far = np.moveaxis(chain.inverse(points, tool_axes), 1, 0)
+    column = chain.rotary[0]
+    for start in near:
+        for end in far.copy():
+            end[column] += 2 * np.pi * np.rint((start[column] - end[column]) / (2 * np.pi))
+            fine = subdivide(chain, points, tool_axes, np.stack([start, end]), 0.01)
+            steps = np.abs(np.diff(fine.joints[:, chain.rotary], axis=0))
+            assert np.degrees(steps.max()) < 60
+            for t in np.linspace(0, 1, 21):
+                tips, _ = chain.forward(fine.joints[:-1] * (1 - t) + fine.joints[1:] * t)
+                assert from_segment(tips, *np.broadcast_arrays(tips * 0 + points[0], points[1])).max() < 0.02
