@@ -23,5 +23,7 @@ class Planner:
     """Moves that it looks ahead, at least; None where it sees all of them."""
     slowest: float = 0.0
     """Units/s; slower moves are sped up to this."""
+    in_steps: bool = False
+    """Whether its corners see positions rounded to whole motor steps, and so small jumps where words have none."""
     tolerance: float = 0.0
     """mm that blends may leave the corner."""

@@ -99,6 +99,8 @@ class _Drive:
     """(m,)."""
     share: FloatArray
     """(m, k + 1) that every joint and the filament move per unit of length."""
+    seen: FloatArray
+    """(m, k + 1) the same, as the corners see it: in whole motor steps, where the firmware counts so."""
     kind: IntArray
     """(m,) 1 where joints move, 2 where linear ones do, 4 where filament moves, added up."""
     nominal: FloatArray
@@ -143,10 +145,10 @@ class _Drive:
             across = DEFAULT_DEVIATION if self.deviation is None else self.deviation
             like_marlin = rules.corners == "marlin"
             corner = kernel.deviation_corners(
-                self.share, nominal, self.length, self.ramp, self.acceleration, across, like_marlin
+                self.seen, nominal, self.length, self.ramp, self.acceleration, across, like_marlin
             )
             return corner, rest
-        return kernel.jerk_corners(self.share, nominal, self.corner_speed)
+        return kernel.jerk_corners(self.seen, nominal, self.corner_speed)
 
 
 def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> _Drive:
@@ -184,6 +186,7 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
         dialect=dialect,
         length=moves.metric,
         share=share,
+        seen=_in_steps(steps, program, profile) / moves.metric[:, None] if dialect.planner.in_steps else share,
         kind=kind,
         nominal=np.minimum(np.maximum(moves.metric / moves.asked, dialect.planner.slowest), reach),
         reach=reach,
@@ -194,6 +197,19 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
         deviation=planner.junction_deviation,
         config=config,
     )
+
+
+def _in_steps(steps: FloatArray, program: MachineProgram, profile: MachineProfile) -> FloatArray:
+    """Moves (m, k + 1) between positions rounded to whole motor steps, where the profile gives them."""
+    per_unit = np.array([joint.steps_per_unit for joint in profile.joints]) / profile.to_shown
+    per_unit = np.append(per_unit, profile.extruder.steps_per_mm)
+    start = np.append(program.start * profile.to_shown, 0.0)
+    known = np.isfinite(per_unit)
+    grid, first = per_unit[known], start[known]
+    place = first + np.cumsum(steps[:, known], axis=0)
+    whole = steps.copy()
+    whole[:, known] = np.diff(np.rint(place * grid), axis=0, prepend=np.rint(first * grid)[None]) / grid
+    return whole
 
 
 def _kinds(moves: Moves, profile: MachineProfile) -> IntArray:

@@ -94,6 +94,22 @@ def replay(motion: Motion, profile: MachineProfile, rules: Rules, limits: Limits
     return Replay(length, asked, entry, cruise, leave, acceleration, begin, duration)
 
 
+def _in_steps(delta: FloatArray, start: FloatArray, profile: MachineProfile) -> FloatArray:
+    """Changes of position between whole step counts of the motors; joints without steps in the profile stay."""
+    seen = delta.copy()
+    first = np.append(start * profile.to_shown, 0.0)
+    for column in range(delta.shape[1]):
+        if column < len(profile.joints):
+            joint = profile.joints[column]
+            steps = joint.steps_per_unit / joint.shown(1.0)
+        else:
+            steps = profile.extruder.steps_per_mm
+        if np.isfinite(steps):
+            counts = np.rint((first[column] + np.cumsum(delta[:, column])) * steps)
+            seen[:, column] = np.diff(counts, prepend=np.rint(first[column] * steps)) / steps
+    return seen
+
+
 def _law(
     motion: Motion,
     profile: MachineProfile,
@@ -189,6 +205,7 @@ def _marlin_or_duet(
         rules.slowest,
         rules.starts_at_corner_speed,
         _tip_lengths(motion, profile),
+        _in_steps(delta, motion.start, profile) if rules.whole_steps else delta,
     )
     return law
 

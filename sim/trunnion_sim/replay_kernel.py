@@ -42,6 +42,7 @@ def plan(
     slowest: float,
     starts_at_corner: bool,
     tip_length: _F,
+    seen: _F,
 ) -> tuple[_F, _F, _F, _F, _F, _F, _F]:
     """Length, asked speed, entry, cruise, exit, acceleration and duration of every row."""
     n, columns = delta.shape
@@ -76,7 +77,7 @@ def plan(
         a = min(a, LARGEST)
         for j in range(columns):
             r = delta[i, j] / d
-            ratio[i, j] = r
+            ratio[i, j] = seen[i, j] / d
             r = abs(r)
             if r > 0:
                 v = min(v, speed_limit[lim, j] / r)

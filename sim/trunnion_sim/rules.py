@@ -37,6 +37,8 @@ class Rules:
     """mm/s; slower moves are sped up to this."""
     starts_at_corner_speed: bool
     """Whether a move from rest starts with the corner speed at once (classic jerk) instead of from zero."""
+    whole_steps: bool = False
+    """Whether corners see positions rounded to whole motor steps."""
     filament: str = "E"
     """Letter of the filament."""
     tip_words: Literal["never", "G43.4", "always"] = "never"

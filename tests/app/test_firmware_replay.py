@@ -15,6 +15,7 @@ from trunnion_gcode.dialect import dialect_names, find_dialect
 from trunnion_gcode.moves import make_moves
 from trunnion_gcode.write import write_program
 from trunnion_motion.plan import plan_motion
+from trunnion_sim.firmware.machine import SoftwareMachine
 from trunnion_sim.judge import context_of
 from trunnion_sim.rules import firmware_names
 
@@ -173,3 +174,26 @@ def test_joints_bend_no_faster_than_they_accelerate(machine):
     jump = np.abs(rate[bead] * law.entry[bead, None] - rate[bead - 1] * law.leave[bead - 1, None])
     between = 0.5 * (law.length[bead] / law.entry[bead] + law.length[bead - 1] / law.leave[bead - 1])
     assert (jump / between[:, None] / profile.array("acceleration")).max() < 1.05
+
+
+@pytest.mark.parametrize("machine", ["generic_ab_cradle", "rep5x_ender3"])
+def test_the_software_machine_takes_the_planned_time(machine, tmp_path):
+    """A third road: Marlin's planner in whole steps, fed line by line over its wire."""
+    profile = load_profile(machine)
+    program = plan_motion(TOOLPATHS["propeller"], profile, SETTINGS).program
+    file = tmp_path / "propeller.gcode"
+    write_program(program, profile, SETTINGS, title="propeller", out=file)
+    lines = [line.partition(";")[0].strip() for line in file.read_text().splitlines()]
+    firmware = SoftwareMachine(profile, speed=None)
+    firmware.take()
+
+    def send(commands):
+        for command in commands:
+            firmware.receive(command.encode() + b"\n")
+            while b"ok" not in firmware.advance(0.0):
+                pass
+
+    send(["M302 P1", "G21", "G90", "M83", "G28", "M400"])
+    began = firmware.now
+    send([line for line in lines if line.startswith(("G0 ", "G1 "))] + ["M400"])
+    assert firmware.now - began == pytest.approx(program.duration.sum(), rel=0.03)

@@ -19,6 +19,8 @@ from trunnion_gcode.moves import MERGE_DEVIATION, make_moves
 from trunnion_gcode.write import write_program
 
 SETTINGS = PrintSettings()
+OF_JOINTS = [name for name in dialect_names() if not find_dialect(name).tip_words]
+"""Dialects whose words are joints; of tips: tests/app/test_firmware_replay.py."""
 
 
 def random_program(profile: MachineProfile, rows: int, seed: int = 0, events: tuple[Event, ...] = ()) -> MachineProgram:
@@ -113,7 +115,7 @@ def written(program: MachineProgram, profile: MachineProfile, settings: PrintSet
     return out.getvalue()
 
 
-@pytest.mark.parametrize("firmware", dialect_names())
+@pytest.mark.parametrize("firmware", OF_JOINTS)
 @pytest.mark.parametrize("seed", range(3))
 def test_joints_and_filament_read_back(firmware: str, seed: int) -> None:
     profile = cradle(firmware)

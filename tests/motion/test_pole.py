@@ -1,5 +1,7 @@
 """Passes over a dome's top on a machine whose platter is singular there."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -36,7 +38,8 @@ def passing(offset_deg):
     + [("rep5x_ender3", offset) for offset in (0, 0.1, 1)],
 )
 def test_with_tolerance_the_tip_keeps_its_speed_past_the_pole(machine, offset_deg):
-    profile = load_profile(machine)
+    # Marlin's corners see whole motor steps, and its Z may jump by 0.3 mm/s only: that slows the head, not the pole.
+    profile = dataclasses.replace(load_profile(machine), firmware="reprapfirmware")
     toolpath = passing(offset_deg)
     program = plan(toolpath, profile, PrintSettings(nonplanar_axis_tolerance=5.0))
     beads = program.width > 0

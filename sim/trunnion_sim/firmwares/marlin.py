@@ -19,4 +19,5 @@ RULES = Rules(
     least_blocks=2,
     slowest=0.05,
     starts_at_corner_speed=True,
+    whole_steps=True,
 )
