@@ -3,7 +3,8 @@
     python bench/replay.py [--samples freeform,propeller] [--machines NAME,...]
 
 Every program is written in the firmware's dialect, read back and replayed by the simulator under that firmware's own
-rules (F, corners, accelerations, look-ahead). LinuxCNC's blends, which overlap, are put end to end in plan and replay.
+rules (F, corners, accelerations, look-ahead); machines that a dialect cannot drive are left out. LinuxCNC's blends,
+which overlap, are put end to end in plan and replay.
 """
 
 import argparse
@@ -14,7 +15,7 @@ from trunnion.agreement import agreement
 from trunnion.pipeline import settings_for, solid_part
 from trunnion_core.profile import load_profile
 from trunnion_core.settings import PrintSettings
-from trunnion_gcode.dialect import dialect_names
+from trunnion_gcode.dialect import dialect_names, find_dialect
 from trunnion_motion.plan import plan_motion
 from trunnion_sim.rules import firmware_names
 from trunnion_slicer.slice import slice_mesh
@@ -40,6 +41,8 @@ def main() -> None:
             toolpath = slice_mesh(part.mesh, settings_for(profile, settings)).toolpath
             for firmware in sorted(set(dialect_names()) & set(firmware_names())):
                 other = dataclasses.replace(profile, firmware=firmware)
+                if find_dialect(firmware).refuses(other):
+                    continue
                 found = agreement(plan_motion(toolpath, other, settings), other, settings)
                 print(
                     f"{name:12}{machine:20}{firmware:16}{found.share_within(0.02):11.3%}"
