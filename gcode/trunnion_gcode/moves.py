@@ -18,6 +18,8 @@ from trunnion_gcode.words import carried_ticks, from_ticks, ticks
 
 MERGE_DEVIATION = 0.004
 """mm or degrees. How far leaving out a point may bend the joints' path: below the chord tolerance of any print."""
+NO_FILAMENT = 1e-9
+"""mm. Less is the rounding of a bead without length, for which there is no line to write."""
 MERGE_PASSES = 6
 """Each pass can halve the number of rows, so this merges up to 64 into one."""
 
@@ -72,7 +74,13 @@ def make_moves(program: MachineProgram, profile: MachineProfile, dialect: Dialec
     for _ in range(MERGE_PASSES):
         if not _merge_once(kept, merged_deviation, program, words, start, profile, dialect):
             break
-    return _measured(kept, program, words, start, profile, dialect)
+    moves = _measured(kept, program, words, start, profile, dialect)
+    nothing = moves.metric <= 0
+    if nothing.any():
+        # Out and back, merged, or filament below the last decimal: what it took and fed goes to the next move.
+        kept[moves.row[nothing]] = False
+        moves = _measured(kept, program, words, start, profile, dialect)
+    return moves
 
 
 def _values(program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> tuple[FloatArray, FloatArray]:
@@ -99,9 +107,16 @@ def joint_decimals(profile: MachineProfile) -> list[int]:
 def _written(program: MachineProgram, words: IntArray, start: IntArray) -> BoolArray:
     """(n,) rows that need a line: a word changes, or filament moves while the joints are meant to stand."""
     moves = (np.diff(words, axis=0, prepend=start[None]) != 0).any(axis=1)
+    return np.asarray(moves | _filament_only(program))
+
+
+def _filament_only(program: MachineProgram) -> BoolArray:
+    """(n,) rows on which filament moves while the joints are meant to stand."""
     stands = (np.diff(program.joints, axis=0, prepend=program.start[None]) == 0).all(axis=1)
-    filament_only = (program.filament != 0) & (stands | (program.role == Role.RETRACT) | (program.role == Role.PRIME))
-    return np.asarray(moves | filament_only)
+    return np.asarray(
+        (np.abs(program.filament) > NO_FILAMENT)
+        & (stands | (program.role == Role.RETRACT) | (program.role == Role.PRIME))
+    )
 
 
 def _merge_once(
