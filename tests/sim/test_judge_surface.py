@@ -137,6 +137,24 @@ def test_a_conformal_skin_on_a_smooth_ramp_has_the_groove_floor(slope: float) ->
     assert report.overfill_fraction < 0.01
 
 
+def over_ripples(period: float) -> Deposit:
+    """One layer of constant flow over a ground that rises and falls by 0.05 mm along the lines."""
+    lines = layer(30, 0.0, 2 * H, 0.1)
+    low, high = np.array([-2.0, -2.0]), np.array([LENGTH + 2.0, ACROSS + 2.0])
+    return lay_down(
+        lines, 30, low, high, 0.025, FLAT, BORE, lambda x, y: 0 * y + H + 0.05 * np.sin(2 * np.pi * x / period)
+    )
+
+
+def test_plastic_is_carried_as_far_as_the_bore_and_no_farther() -> None:
+    narrow, wide = over_ripples(BORE / 2), over_ripples(4.0)
+    # As over flat ground; what little is pressed aside narrows the grooves.
+    assert 0.65 * groove_floor() < float(np.mean(2 * H - middle(narrow))) < 1.1 * groove_floor()
+    assert middle(narrow).max() < 2 * H + 0.01
+    # Over ripples longer than the bore the bead has too much plastic on their backs.
+    assert middle(wide).max() > 2 * H + 0.015
+
+
 @pytest.mark.parametrize("slope", [0.0, 0.1, 0.364])
 def test_a_skin_over_skins_also_fills_the_grooves_below(slope: float) -> None:
     report = skin(slope, 3.0, W / 12)
