@@ -387,3 +387,15 @@ def test_a_joint_with_the_letter_of_the_filament_is_refused() -> None:
     joints = (dataclasses.replace(profile.joints[0], letter="U"), *profile.joints[1:])
     with pytest.raises(GcodeError, match="joint U has the letter of linuxcnc's filament"):
         written(random_program(profile, 5), dataclasses.replace(profile, joints=joints))
+
+
+def test_a_bead_without_length_is_no_line_whatever_rounding_left_in_it() -> None:
+    profile = load_profile("rep5x_ender3")
+    program = random_program(profile, 40)
+    joints, filament = program.joints.copy(), program.filament.copy()
+    joints[8] = joints[7]
+    filament[8] = 5e-17
+    still = dataclasses.replace(program, joints=joints, filament=filament)
+    moves = make_moves(still, profile, find_dialect(profile.firmware))
+    assert 8 not in moves.row
+    assert (moves.metric > 0).all()
