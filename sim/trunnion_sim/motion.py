@@ -4,6 +4,7 @@ Every motion row ends in joint values; non-motion commands are kept beside, each
 The state machine runs over the words in one compiled loop and is carried from block to block.
 """
 
+import dataclasses
 import math
 from collections import Counter
 from collections.abc import Iterable
@@ -17,7 +18,7 @@ from trunnion_core.profile import MachineProfile
 from trunnion_sim import motion_kernel as kernel
 from trunnion_sim.reader import Block
 from trunnion_sim.rules import Rules
-from trunnion_sim.tip_rows import joints_of_tips
+from trunnion_sim.tip_rows import cut_words, joints_of_tips, pieces_of_tips
 
 
 @dataclass(frozen=True)
@@ -134,12 +135,19 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
             if hit.size:
                 dropped.setdefault(reason, []).extend(hit.tolist())
     joined = kernel.joined(parts)
+    start = np.zeros(k)
     of_tip = _of_tip(commands, joined.kind, rules)
+    joints = joints_of_tips(profile, joined.joints / profile.to_shown, of_tip)
+    pieces = pieces_of_tips(profile, start, joints, of_tip)
+    if (pieces > 1).any():
+        joined, commands = _cut(profile, start, joints, joined, pieces, commands)
+        of_tip = np.repeat(of_tip, pieces)
+        joints = joints_of_tips(profile, joined.joints / profile.to_shown, of_tip)
     return Motion(
         line=joined.line,
         kind=joined.kind,
-        start=np.zeros(k),
-        joints=joints_of_tips(profile, joined.joints / profile.to_shown, of_tip),
+        start=start,
+        joints=joints,
         filament=joined.filament,
         feed=joined.feed,
         inverse=(joined.flags & kernel.INVERSE) > 0,
@@ -163,6 +171,32 @@ def _of_tip(commands: list[Command], kind: NDArray[np.uint8], rules: Rules) -> B
             if command.name in ("G43.4", "G49"):
                 named[command.row :] = command.name == "G43.4"
     return np.asarray(named & (kind != kernel.HOME))
+
+
+def _cut(
+    profile: MachineProfile,
+    start: FloatArray,
+    joints: FloatArray,
+    made: kernel.Rows,
+    count: IntArray,
+    commands: list[Command],
+) -> tuple[kernel.Rows, list[Command]]:
+    """Rows cut into `count` (n,) pieces each, and the commands before them; rests and bytes stay with the first."""
+    rows, piece, words = cut_words(profile, start, joints, made.joints / profile.to_shown, count)
+    first = piece == 1
+    pieces = kernel.Rows(
+        line=made.line[rows],
+        kind=made.kind[rows],
+        joints=words * profile.to_shown,
+        filament=made.filament[rows] / count[rows],
+        feed=np.where(made.flags[rows] & kernel.INVERSE, made.feed[rows] * count[rows], made.feed[rows]),
+        flags=made.flags[rows],
+        homed=made.homed[rows],
+        dwell=np.where(first, made.dwell[rows], 0.0),
+        bytes=np.where(first, made.bytes[rows], 0),
+    )
+    begins = np.append(np.cumsum(count) - count, count.sum())
+    return pieces, [dataclasses.replace(command, row=int(begins[command.row])) for command in commands]
 
 
 def _collect(

@@ -2,15 +2,22 @@
 
 X, Y and Z of such a row are the tip over the part, in the coordinates that the linear joints have with all rotaries at
 zero; the rotary words are joints. With those known the tip is linear in the linear joints, so each row is one 3x3
-system, made from four forward maps. Between rows the joints are taken to run straight: the controllers follow the tip's
-straight line in small pieces, and programs that keep to a chord tolerance differ from that by no more.
+system, made from four forward maps. Between rows joints run straight. The controllers follow the tip's straight line in
+small pieces, so a row whose joints would take the tip off its line is cut; rows of programs that keep to a chord
+tolerance stay whole.
 """
 
 import numpy as np
-from trunnion_core.arrays import BoolArray, FloatArray
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 
 from trunnion_sim.chain import forward
+
+MOST_OFF = 0.03
+"""mm that the tip may leave its line between the ends of a row that stays whole."""
+FOLLOWED = 0.01
+"""mm that it may between the ends of a piece."""
+MOST_PIECES = 2000
 
 
 def joints_of_tips(profile: MachineProfile, words: FloatArray, named: BoolArray) -> FloatArray:
@@ -41,3 +48,43 @@ def world_steps(profile: MachineProfile, start: FloatArray, joints: FloatArray) 
     """(n, 3) mm that the tip moves over the part in every row from `start` (k,) through `joints` (n, k)."""
     points, _ = forward(profile, np.concatenate([start[None], joints]))
     return np.diff(points, axis=0)
+
+
+def pieces_of_tips(profile: MachineProfile, start: FloatArray, joints: FloatArray, named: BoolArray) -> IntArray:
+    """(n,) pieces that rows have to be cut into so that straight joints keep the tip within FOLLOWED of its line.
+
+    `start` (k,) and `joints` (n, k) mm or rad. Only rows `named` (n,) that turn a rotary are cut. The controllers cut
+    them finer still, 200 times a second.
+    """
+    count = np.ones(len(joints), np.int64)
+    before = np.concatenate([start[None], joints[:-1]])
+    turns = np.abs(joints - before)[:, list(profile.rotary)].max(axis=1, initial=0.0) > 0
+    rows = np.flatnonzero(named & turns)
+    if not rows.size:
+        return count
+    begin, _ = forward(profile, before[rows])
+    end, _ = forward(profile, joints[rows])
+    off = np.zeros(len(rows))
+    for share in (0.25, 0.5, 0.75):
+        there, _ = forward(profile, before[rows] + share * (joints[rows] - before[rows]))
+        off = np.maximum(off, np.linalg.norm(there - begin - share * (end - begin), axis=1))
+    cut = off > MOST_OFF
+    count[rows[cut]] = np.minimum(np.ceil(np.sqrt(off[cut] / FOLLOWED)), MOST_PIECES).astype(np.int64)
+    return count
+
+
+def cut_words(
+    profile: MachineProfile, start: FloatArray, joints: FloatArray, words: FloatArray, count: IntArray
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Row, piece from 1, and words (m, k) of every piece of rows cut into `count` (n,): even steps of the words."""
+    rows = np.repeat(np.arange(len(count)), count)
+    piece = np.arange(len(rows)) - np.repeat(np.cumsum(count) - count, count) + 1
+    cut = np.flatnonzero(count > 1)
+    begin = words.copy()
+    previous = np.concatenate([start[None], joints[:-1]])[cut]
+    begin[cut] = previous
+    points, _ = forward(profile, previous)
+    for place, letter in enumerate("XYZ"):
+        begin[cut, profile.letters.index(letter)] = (points + profile.origin - profile.tip)[:, place]
+    share = (piece / count[rows])[:, None]
+    return rows, piece, np.where(share < 1, begin[rows] + share * (words[rows] - begin[rows]), words[rows])
