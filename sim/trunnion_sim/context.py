@@ -98,9 +98,10 @@ class Context:
         """Rows (m,), tip (m, 3) and tool axis (m, 3) along the motion, so close that arcs of rotaries are seen."""
         rows, fractions = pieces(self.motion, self.profile, TURN_STEP)
         whole = fractions >= 1.0
+        if whole.all():
+            return rows, self.points, self.tool_axes
         points, axes = self.points[rows], self.tool_axes[rows]
-        if not whole.all():
-            points[~whole], axes[~whole] = forward(self.profile, samples(self.motion, rows[~whole], fractions[~whole]))
+        points[~whole], axes[~whole] = forward(self.profile, samples(self.motion, rows[~whole], fractions[~whole]))
         return rows, points, axes
 
     @cached_property
@@ -184,13 +185,14 @@ class Context:
         start_tip, start_axis = forward(self.profile, self.motion.start[None])
         return sweep(
             self.scene,
-            np.vstack([self.motion.start, self.motion.joints]),
-            np.vstack([start_tip, self.points]),
-            np.vstack([start_axis, self.tool_axes]),
-            np.append(0.0, self.stadium_width),
-            np.append(0.0, self.bead_height),
-            np.append(False, ~self.homing),
-        ).without_start()
+            self.motion.joints,
+            self.points,
+            self.tool_axes,
+            self.stadium_width,
+            self.bead_height,
+            ~self.homing,
+            first=(self.motion.start, start_tip[0], start_axis[0]),
+        )
 
     def find(
         self,

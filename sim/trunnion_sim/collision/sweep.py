@@ -15,7 +15,7 @@ than PRESS above the plane of the tip.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -31,6 +31,8 @@ and the rounding of heights, so that a step down by exactly 0.1 is not decided b
 SMALLEST_STEP = 0.05
 """mm that no point of a body moves beyond between two poses that decide."""
 FAR = 1e9
+CHUNK = 100_000
+"""Rows between two collections of hits: what every row keeps for every body is kept for so many only."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +50,6 @@ class Hits:
     poses: int
     """How many poses were looked at."""
 
-    def without_start(self) -> "Hits":
-        """The same with rows counted from the first motion, where row 0 of the sweep was the pose before it."""
-        return replace(self, rows=self.rows - 1)
-
 
 def sweep(
     scene: Scene,
@@ -61,57 +59,61 @@ def sweep(
     width: FloatArray,
     height: FloatArray,
     checked: BoolArray,
+    first: tuple[FloatArray, FloatArray, FloatArray] | None = None,
 ) -> Hits:
     """Hits along joints (n, k): row i moves from joints[i-1] to joints[i] and lays a bead where width[i] > 0.
 
     tips (n, 3) mm and tool_axes (n, 3) in `part` belong to the rows' ends; width, height (n,) mm. Rows that are not
-    `checked` (n,) are passed over, such as homing; row 0 always is.
+    `checked` (n,) are passed over, such as homing. Row 0 moves from `first` (its joints, tip and tool axis); without
+    it, row 0 is only where row 1 starts.
     """
     ground = scene.ground
     cells = ground.copy()
     blocks = ground.reshape(ground.shape[0] // BLOCK, BLOCK, ground.shape[1] // BLOCK, BLOCK).max(axis=(1, 3))
     tiles = blocks.reshape(blocks.shape[0] // BLOCK, BLOCK, blocks.shape[1] // BLOCK, BLOCK).max(axis=(1, 3))
+    blocks, tiles = np.ascontiguousarray(blocks), np.ascontiguousarray(tiles)
     n, bodies = len(joints), len(scene.bodies)
-    worst = np.full((n, bodies), FAR)
-    where = np.zeros((n, bodies, 3))
-    if n < 2 or bodies == 0:
-        return Hits(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty((0, 3)), math.inf, 0)
-    clearance, poses = _sweep(
-        np.ascontiguousarray(joints),
-        np.ascontiguousarray(tips),
-        np.ascontiguousarray(tool_axes),
-        np.ascontiguousarray(width),
-        np.ascontiguousarray(height),
-        np.ascontiguousarray(checked),
-        scene.work_side,
-        scene.rotary,
-        scene.axes,
-        scene.pivots,
-        scene.origin,
-        scene.bodies,
-        scene.middles,
-        scene.radii,
-        scene.turns,
-        scene.places,
-        scene.carried,
-        scene.nozzle,
-        cells,
-        np.ascontiguousarray(blocks),
-        np.ascontiguousarray(tiles),
-        scene.corner,
-        scene.floor,
-        worst,
-        where,
-    )
-    rows, body = np.nonzero(worst < 0.0)
-    return Hits(
-        rows.astype(np.int64),
-        body.astype(np.int64),
-        -worst[rows, body],
-        where[rows, body],
-        math.inf if clearance >= FAR else float(clearance),
-        int(poses),
-    )
+    begin = 1 if first is None else 0
+    parts = [(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty((0, 3)))]
+    clearance, poses = FAR, 0
+    for low in range(begin, n if bodies else 0, CHUNK):
+        rows = slice(low, low + CHUNK)
+        start = (joints[low - 1], tips[low - 1], tool_axes[low - 1]) if first is None or low else first
+        count = len(joints[rows])
+        worst = np.full((count + 1, bodies), FAR)
+        where = np.zeros((count + 1, bodies, 3))
+        near, looked = _sweep(
+            np.vstack([start[0], joints[rows]]),
+            np.vstack([start[1], tips[rows]]),
+            np.vstack([start[2], tool_axes[rows]]),
+            np.append(0.0, width[rows]),
+            np.append(0.0, height[rows]),
+            np.append(False, checked[rows]),
+            scene.work_side,
+            scene.rotary,
+            scene.axes,
+            scene.pivots,
+            scene.origin,
+            scene.bodies,
+            scene.middles,
+            scene.radii,
+            scene.turns,
+            scene.places,
+            scene.carried,
+            scene.nozzle,
+            cells,
+            blocks,
+            tiles,
+            scene.corner,
+            scene.floor,
+            worst,
+            where,
+        )
+        clearance, poses = min(clearance, near), poses + looked
+        row, body = np.nonzero(worst < 0.0)
+        parts.append((row.astype(np.int64) - 1 + low, body.astype(np.int64), -worst[row, body], where[row, body]))
+    found = [np.concatenate([part[column] for part in parts]) for column in range(4)]
+    return Hits(*found, math.inf if clearance >= FAR else float(clearance), int(poses))
 
 
 @njit(cache=True)
