@@ -52,6 +52,15 @@ SNAP = 0.15
 SAME_AXIS = 1e-5
 """Tool axes that differ by less are tested once."""
 
+MANY = 20_000
+"""Poses that are tested one by one."""
+
+BESIDE = 0.4
+"""mm: a bead's width, in which one pose stands for all of many."""
+
+ALIKE = 0.05
+"""Difference of unit vectors up to which tool axes of such poses count as one direction: 3 degrees."""
+
 ROUNDS = 6
 """How often the test is repeated at most."""
 
@@ -200,14 +209,29 @@ def _at_corners(scene: _Scene, mesh: Mesh, region: BoolArray) -> tuple[FloatArra
     corner = mesh.faces[region].ravel()
     lean = np.round(axes[region].reshape(-1, 3) / SAME_AXIS).astype(np.int64)
     _, first = np.unique(np.column_stack([corner, lean]), axis=0, return_index=True)
-    poses = (value[region].reshape(-1, 3)[first] for value in (mesh.triangles, axes, steps))
-    gap, nearest = scene.clearance(*poses)
+    poses = [value[region].reshape(-1, 3)[first] for value in (mesh.triangles, axes, steps)]
+    tested, same = _tested_once(poses[0], poses[1])
+    gap, nearest = scene.clearance(*(value[tested] for value in poses))
+    gap, nearest = gap[same], nearest[same]
     order = np.lexsort((gap, corner[first]))
     least = order[np.concatenate([[True], np.diff(corner[first][order]) != 0])]
     at, by = np.full(len(mesh.vertices), NEAR), np.zeros(len(mesh.vertices), np.int64)
     at[corner[first][least]], by[corner[first][least]] = gap[least], np.maximum(nearest[least], 0)
     clearance[region], body[region] = at[mesh.faces[region]], by[mesh.faces[region]]
     return clearance, body
+
+
+def _tested_once(tips: FloatArray, axes: FloatArray) -> tuple[IntArray, IntArray]:
+    """Which of many poses (n, 3) stand for all, and the place in them of the one that stands for each (n,).
+
+    Up to MANY every pose is tested. A finer mesh says nothing new about where the head fits: there, poses in one cube
+    of a BESIDE and of nearly one direction are tested once.
+    """
+    if len(tips) <= MANY:
+        return np.arange(len(tips)), np.arange(len(tips))
+    keys = np.column_stack([np.floor(tips / BESIDE), np.round(axes / ALIKE)]).astype(np.int64)
+    _, tested, same = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return tested, same.ravel()
 
 
 def _split_mixed(scene: _Scene, mesh: Mesh, region: BoolArray, parent: IntArray) -> tuple[Mesh, BoolArray, IntArray]:
