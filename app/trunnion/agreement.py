@@ -64,9 +64,10 @@ def agreement(plan: PlanResult, profile: MachineProfile, settings: PrintSettings
         write_program(program, profile, settings, title="agreement", out=file)
         context = context_of(file, profile)
     moves = make_moves(program, profile, find_dialect(profile.firmware, profile.file))
-    rows = np.flatnonzero(~context.homing)[: len(moves.row)]
+    rows, first, count = _rows_of_moves(context, len(moves.row))
     fraction = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    replayed = _replayed(context, rows, fraction)
+    piece = np.minimum((fraction * count[:, None]).astype(np.int64), count[:, None] - 1)
+    replayed = _replayed(context, rows[first[:, None] + piece], fraction * count[:, None] - piece)
     planned, length = _planned(plan.law, program.tip_length, moves.row, fraction)
     replay = context.replay
     driven = np.abs(context.motion.joints - context.motion.before)[rows]
@@ -84,20 +85,32 @@ def agreement(plan: PlanResult, profile: MachineProfile, settings: PrintSettings
     )
 
 
+def _rows_of_moves(context: Context, moves: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Rows of the replay (m,), and which of them is each move's first and how many it has, both (moves,).
+
+    The judge cuts long turns of tip words into even pieces.
+    """
+    rows = np.flatnonzero(~context.homing)
+    first = np.flatnonzero(np.diff(context.motion.line[rows], prepend=-1))
+    end = int(first[moves]) if len(first) > moves else len(rows)
+    first = first[:moves]
+    return rows[:end], first, np.diff(np.append(first, end))
+
+
 def on_firmware(profile: MachineProfile, firmware: str) -> MachineProfile:
     """The same machine with other firmware."""
     return dataclasses.replace(profile, firmware=firmware)
 
 
 def _replayed(context: Context, rows: IntArray, fraction: FloatArray) -> FloatArray:
-    """(m, SAMPLES) mm/s of the tip at fractions of the rows."""
+    """(m, SAMPLES) mm/s of the tip at fractions of the rows, both (m, SAMPLES)."""
     replay = context.replay
     entry, cruise, leave, a, d = (
-        value[rows][:, None] for value in (replay.entry, replay.cruise, replay.exit, replay.acceleration, replay.length)
+        value[rows] for value in (replay.entry, replay.cruise, replay.exit, replay.acceleration, replay.length)
     )
     way = fraction * d
     speed = np.minimum(np.sqrt(entry**2 + 2 * a * way), np.sqrt(leave**2 + 2 * a * (d - way)))
-    per_length = np.divide(context.tip_length[rows][:, None], d, out=np.zeros_like(d), where=d > 0)
+    per_length = np.divide(context.tip_length[rows], d, out=np.zeros_like(d), where=d > 0)
     return np.asarray(np.minimum(speed, cruise) * per_length)
 
 

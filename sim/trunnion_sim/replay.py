@@ -206,6 +206,7 @@ def _marlin_or_duet(
         rules.starts_at_corner_speed,
         _tip_lengths(motion, profile),
         _in_steps(delta, motion.start, profile) if rules.whole_steps else delta,
+        rules.shortest_linear,
     )
     return law
 

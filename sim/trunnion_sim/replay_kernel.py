@@ -43,6 +43,7 @@ def plan(
     starts_at_corner: bool,
     tip_length: _F,
     seen: _F,
+    shortest: float,
 ) -> tuple[_F, _F, _F, _F, _F, _F, _F]:
     """Length, asked speed, entry, cruise, exit, acceleration and duration of every row."""
     n, columns = delta.shape
@@ -64,6 +65,8 @@ def plan(
                     turned += delta[i, j] ** 2
         if tip_length[i] >= 0:
             straight = tip_length[i] ** 2
+        if straight <= shortest * shortest:
+            straight = 0.0
         d = math.sqrt(straight) if straight > 0 else (math.sqrt(turned) if turned > 0 else abs(delta[i, k]))
         moves = straight > 0 or turned > 0
         kind[i] = (1 if moves else 0) | (2 if straight > 0 else 0) | (4 if delta[i, k] != 0 else 0)

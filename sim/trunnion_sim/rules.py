@@ -39,6 +39,8 @@ class Rules:
     """Whether a move from rest starts with the corner speed at once (classic jerk) instead of from zero."""
     whole_steps: bool = False
     """Whether corners see positions rounded to whole motor steps."""
+    shortest_linear: float = 0.0
+    """mm: F is read over the rotaries where linear motion is no longer than this."""
     filament: str = "E"
     """Letter of the filament."""
     tip_words: Literal["never", "G43.4", "always"] = "never"

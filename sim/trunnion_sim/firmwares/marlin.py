@@ -1,4 +1,7 @@
-"""Marlin 2.1: commands of `gcode/gcode.cpp`, motion as in `module/planner.cpp` (classic jerk or junction deviation)."""
+"""Marlin 2.1: commands of `gcode/gcode.cpp`, motion as in `module/planner.cpp` (classic jerk or junction deviation).
+
+F is read over the rotaries where the squared linear length is UNEAR_ZERO (`get_move_distance`).
+"""
 
 from trunnion_sim.rules import Rules, codes
 
@@ -20,4 +23,5 @@ RULES = Rules(
     slowest=0.05,
     starts_at_corner_speed=True,
     whole_steps=True,
+    shortest_linear=1e-3,
 )
