@@ -93,7 +93,10 @@ class Motion:
 KEPT = (
     {
         ("M", n * 10)
-        for n in (0, 1, 82, 83, 104, 109, 112, 116, 140, 190, 191, 200, 201, 203, 204, 205, 302, 566, 568, 600)
+        for n in (
+            *(0, 1, 82, 83, 104, 109, 112, 116, 140, 190, 191, 200, 201, 203, 204, 205, 302),
+            *(566, 568, 572, 600, 900),
+        )
     }
     | {("G", n * 10) for n in (4, 10, 20, 28, 29, 49, 90, 91, 92, 93, 94)}
     | {("G", 434)}
@@ -138,7 +141,7 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
     start = np.zeros(k)
     of_tip = _of_tip(commands, joined.kind, rules)
     joints = joints_of_tips(profile, joined.joints / profile.to_shown, of_tip)
-    pieces = pieces_of_tips(profile, start, joints, of_tip)
+    pieces = pieces_of_tips(profile, start, joints, of_tip, joined.filament > 0)
     if (pieces > 1).any():
         joined, commands = _cut(profile, start, joints, joined, pieces, commands)
         of_tip = np.repeat(of_tip, pieces)

@@ -13,8 +13,10 @@ from trunnion_core.profile import MachineProfile
 
 from trunnion_sim.chain import forward
 
-MOST_OFF = 0.03
-"""mm that the tip may leave its line between the ends of a row that stays whole."""
+MOST_OFF = 0.05
+"""mm that the tip may leave its line between the ends of a row that feeds and stays whole."""
+MOST_OFF_IN_AIR = 0.5
+"""The same where nothing is fed: travels are planned to less."""
 FOLLOWED = 0.01
 """mm that it may between the ends of a piece."""
 MOST_PIECES = 2000
@@ -50,11 +52,13 @@ def world_steps(profile: MachineProfile, start: FloatArray, joints: FloatArray) 
     return np.diff(points, axis=0)
 
 
-def pieces_of_tips(profile: MachineProfile, start: FloatArray, joints: FloatArray, named: BoolArray) -> IntArray:
+def pieces_of_tips(
+    profile: MachineProfile, start: FloatArray, joints: FloatArray, named: BoolArray, fed: BoolArray
+) -> IntArray:
     """(n,) pieces that rows have to be cut into so that straight joints keep the tip within FOLLOWED of its line.
 
-    `start` (k,) and `joints` (n, k) mm or rad. Only rows `named` (n,) that turn a rotary are cut. The controllers cut
-    them finer still, 200 times a second.
+    `start` (k,) and `joints` (n, k) mm or rad; `fed` (n,) says where plastic flows. Only rows `named` (n,) that turn a
+    rotary are cut. The controllers cut them finer still, 200 times a second.
     """
     count = np.ones(len(joints), np.int64)
     before = np.concatenate([start[None], joints[:-1]])
@@ -68,7 +72,7 @@ def pieces_of_tips(profile: MachineProfile, start: FloatArray, joints: FloatArra
     for share in (0.25, 0.5, 0.75):
         there, _ = forward(profile, before[rows] + share * (joints[rows] - before[rows]))
         off = np.maximum(off, np.linalg.norm(there - begin - share * (end - begin), axis=1))
-    cut = off > MOST_OFF
+    cut = off > np.where(fed[rows], MOST_OFF, MOST_OFF_IN_AIR)
     count[rows[cut]] = np.minimum(np.ceil(np.sqrt(off[cut] / FOLLOWED)), MOST_PIECES).astype(np.int64)
     return count
 
