@@ -59,7 +59,7 @@ def context_of(program: Path, profile: MachineProfile) -> Context:
     if not motion.code_count:
         raise GcodeError(f"{program}: no line holds a G, M or T command, should be a G-code program")
     points, tool_axes = forward(profile, motion.joints)
-    limits = limits_of(motion, profile)
+    limits = limits_of(motion, profile, rules.slowest)
     return Context(
         profile=profile,
         rules=rules,
@@ -151,6 +151,8 @@ def _report(context: Context, findings: tuple[Finding, ...], surface: SurfaceRep
             "p50": _percentile(flow[moving], replayed.duration[moving], 50) or 0.0,
             "max": float(flow[moving].max(initial=0.0)),
         },
+        role=context.rows.role,
+        width=context.stadium_width,
         surface=surface,
         clearance=context.hits.clearance if math.isfinite(context.hits.clearance) else None,
     )

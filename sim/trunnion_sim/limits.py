@@ -28,10 +28,12 @@ class Limits:
     """(m, k + 1) per second: what may jump."""
     path: FloatArray
     """(m, 3) acceleration along the path in mm/s² when printing, travelling and retracting."""
+    slowest: FloatArray
+    """(m, 1) per second along the firmware's metric: slower moves are sped up to this."""
 
 
-def limits_of(motion: Motion, profile: MachineProfile) -> Limits:
-    """Follow the limit-setting commands of the program from the profile's own limits."""
+def limits_of(motion: Motion, profile: MachineProfile, slowest: float) -> Limits:
+    """Follow the limit-setting commands of the program from the profile's own limits and the firmware's `slowest`."""
     extruder, planner = profile.extruder, profile.planner
     scale = profile.to_shown
     now = {
@@ -42,6 +44,7 @@ def limits_of(motion: Motion, profile: MachineProfile) -> Limits:
     printing = math.inf if planner.acceleration is None else planner.acceleration
     travel = printing if planner.travel_acceleration is None else planner.travel_acceleration
     now["path"] = np.array([printing, travel, math.inf])
+    now["slowest"] = np.array([slowest])
     tables = {name: [value] for name, value in now.items()}
     which = np.zeros(len(motion), np.int64)
     for command in motion.commands:
@@ -72,7 +75,11 @@ def _change(command: Command, now: dict[str, FloatArray], profile: MachineProfil
             value = command.get(letter)
             if value is not None and value > 0:
                 values[column] = value / divisor
-        return {} if (values == now[table]).all() else {table: values}
+        lowest = now["slowest"]
+        if name == "M203" and profile.firmware == "reprapfirmware" and (least := command.get("I")) is not None:
+            lowest = np.array([max(least, 0.0) / 60.0])
+        changed = {table: values, "slowest": lowest}
+        return {key: value for key, value in changed.items() if (value != now[key]).any()}
     if name == "M204":
         path = now["path"].copy()
         both = command.get("S")

@@ -203,6 +203,7 @@ def _marlin_or_duet(
         0.0 if deviation is None else deviation,
         max(rules.least_blocks, profile.planner.blocks),
         rules.slowest,
+        limits.slowest,
         rules.starts_at_corner_speed,
         _tip_lengths(motion, profile),
         _in_steps(delta, motion.start, profile) if rules.whole_steps else delta,

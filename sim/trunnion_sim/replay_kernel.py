@@ -40,6 +40,7 @@ def plan(
     deviation: float,
     blocks: int,
     slowest: float,
+    slowest_limit: _F,
     starts_at_corner: bool,
     tip_length: _F,
     seen: _F,
@@ -75,7 +76,7 @@ def plan(
         length[i] = d
         lim = which[i]
         asked[i] = feed[i] * d if inverse[i] else feed[i]
-        v = max(asked[i], slowest)
+        v = max(asked[i], slowest_limit[lim, 0])
         a = path_limit[lim, 2] if not moves else (path_limit[lim, 0] if delta[i, k] > 0 else path_limit[lim, 1])
         a = min(a, LARGEST)
         for j in range(columns):
