@@ -14,6 +14,7 @@ from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import ProfileError
 from trunnion_core.profile_file import (
     BedTable,
+    BodyTable,
     ExtruderTable,
     GcodeTable,
     HeatersTable,
@@ -84,6 +85,8 @@ class MachineProfile:
     heaters: HeatersTable
     planner: PlannerTable
     gcode: GcodeTable
+    bodies: tuple[BodyTable, ...] = ()
+    """Bodies in the machine frame that other joints than the last carry, or the frame."""
 
     @cached_property
     def letters(self) -> tuple[str, ...]:
@@ -187,6 +190,7 @@ def profile_from_file(file: ProfileFile, source: str) -> MachineProfile:
         heaters=file.heaters,
         planner=file.planner,
         gcode=file.gcode,
+        bodies=file.body,
     )
 
 

@@ -108,6 +108,13 @@ class BoxTable(_Table):
 SolidTable = Annotated[ConeTable | CylinderTable | BoxTable, Field(discriminator="shape")]
 
 
+class BodyTable(_Table):
+    """A body of the machine that is neither tool nor table, such as a gantry's beam, for collision with the part."""
+
+    carried_by: str = Field(description="Letter of the tool-side joint that carries it, or frame.")
+    solid: SolidTable = Field(description="Convex solid: mm, machine frame, all joints at zero.")
+
+
 class ToolTable(_Table):
     """The nozzle. Bodies stand in the tool frame: origin at the tip, Z along the tool axis."""
 
@@ -224,6 +231,7 @@ class ProfileFile(_Table):
     joint: tuple[JointTable, ...] = Field(description="In order from the frame outwards, within each side.")
     tool: ToolTable = ToolTable()
     work: WorkTable
+    body: tuple[BodyTable, ...] = Field((), description="Bodies that other joints than the last carry, or the frame.")
     extruder: ExtruderTable = ExtruderTable()
     heaters: HeatersTable = HeatersTable()
     planner: PlannerTable = PlannerTable()
@@ -236,6 +244,13 @@ class ProfileFile(_Table):
             raise ValueError("; ".join(problems))
         if not np.linalg.norm(self.tool.axis) > 0:
             raise ValueError("tool.axis: is zero, should be a direction")
+        carriers = ["frame", *(joint.letter for joint in self.joint if joint.side == "tool")]
+        for body in self.body:
+            if body.carried_by not in carriers:
+                raise ValueError(
+                    f"body {body.solid.name}: carried_by is {body.carried_by}, should be one of {', '.join(carriers)}; "
+                    "what moves with the part belongs to work.body"
+                )
         return self
 
 

@@ -92,7 +92,7 @@ def test_a_shipped_machine_loads_and_makes_sense(name):
     assert min(getattr(solid, "bottom", None) or 0.0 for solid in profile.tool_bodies) == 0.0
     assert profile.assumed
     letters = {f"joint.{letter}" for letter in profile.letters}
-    tables = {"joint", "tool", "work", "extruder", "heaters", "planner"}
+    tables = {"joint", "tool", "work", "body", "extruder", "heaters", "planner"}
     for key in profile.assumed:
         assert key.partition(".")[0] in tables
         assert not key.startswith("joint.") or key.rpartition(".")[0] in letters

@@ -183,3 +183,41 @@ def test_nothing_is_missed_against_a_dense_oracle(seed):
     assert np.isfinite(found[surely]).all()
     assert not np.isfinite(found[surely_not]).any()
     np.testing.assert_allclose(found[surely], expected[surely], atol=0.15)
+
+
+def with_body(carried_by: str, low: list[float], high: list[float]) -> MachineProfile:
+    """The cradle without a nozzle, and one beam."""
+    shipped = tomllib.loads(shipped_profiles()["generic_ab_cradle"].read_text())
+    shipped["tool"]["body"] = []
+    solid = {"shape": "box", "name": "beam", "min": low, "max": high}
+    shipped["body"] = [{"carried_by": carried_by, "solid": solid}]
+    return profile_from_file(ProfileFile.model_validate(shipped), "test")
+
+
+@pytest.mark.parametrize(("carrier", "follows"), [("frame", ""), ("X", "X"), ("Y", "XY"), ("Z", "XYZ")])
+def test_a_beam_moves_with_the_joints_that_carry_it(carrier: str, follows: str) -> None:
+    """A column of plastic 12 mm high at the origin, a beam 4 mm above the plate at X = 30: who brings it there?"""
+    profile = with_body(carrier, [25, -5, 4], [35, 5, 10])
+    column = [[0, 0, z] for z in np.arange(0.3, 12, 0.3)]
+    path = [[1.5, 0, 0.3], *(p for c in column for p in (c, [1.5, 0, c[2]])), [1.5, 0, 60]]
+    width = np.append(np.append(0.0, np.full(len(path) - 2, 0.4)), 0.0)
+    away = {"X": [-30, 0, 0], "XY": [-30, 0, 0], "XYZ": [-30, 0, 0], "": [-30, 0, 60]}[follows]
+    hits = run(profile, upright([*path, away]), np.append(width, 0.0))
+    assert (len(path) in hits.rows) == (follows != "")
+    high = run(profile, upright([*path, [-30, 0, 60]]), np.append(width, 0.0))
+    assert (len(path) in high.rows) == (follows in ("X", "XY"))
+
+
+def test_a_tilting_table_brings_the_part_to_a_fixed_beam() -> None:
+    profile = with_body("frame", [-150, 60, 20], [150, 80, 40])
+    still = upright([[0, 0, 100], [0, 0, 100]])
+    tilted = still.copy()
+    tilted[1, 3] = np.radians(50)
+    assert not len(run(profile, upright([[0, 0, 100], [50, 50, 90]]), np.zeros(2)).rows)
+    hits = run(profile, tilted, np.zeros(2))
+    assert set(hits.rows) == {1}
+
+
+def test_what_moves_with_the_part_is_no_body_of_the_frame() -> None:
+    with pytest.raises(ValueError, match="carried_by is A, should be one of frame, X, Y, Z"):
+        with_body("A", [0, 0, 0], [1, 1, 1])

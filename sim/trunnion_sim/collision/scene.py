@@ -58,8 +58,9 @@ class Scene:
 def make_scene(profile: MachineProfile) -> Scene:
     """The arrays of a machine."""
     tool_turn = _tool_frame(profile.tool_axis)
-    tool_joints = sum(joint.side == "tool" for joint in profile.joints)
-    rows = [row_of(solid) for solid in profile.tool_bodies]
+    carriers = ["frame", *(joint.letter for joint in profile.joints if joint.side == "tool")]
+    tool, others = profile.tool_bodies, profile.bodies
+    rows = [row_of(solid) for solid in (*tool, *(body.solid for body in others))]
     corner, ground = _ground(profile)
     return Scene(
         work_side=np.array([joint.side == "work" for joint in profile.joints]),
@@ -70,11 +71,13 @@ def make_scene(profile: MachineProfile) -> Scene:
         bodies=np.array(rows).reshape(len(rows), 8),
         middles=np.array([middle_of(row) for row in rows]).reshape(len(rows), 3),
         radii=np.array([radius_of(row) for row in rows]),
-        turns=np.tile(tool_turn, (len(rows), 1, 1)),
-        places=np.tile(profile.tip, (len(rows), 1)),
-        carried=np.full(len(rows), tool_joints, dtype=np.int64),
-        nozzle=np.ones(len(rows), dtype=np.bool_),
-        names=tuple(solid.name for solid in profile.tool_bodies),
+        turns=np.array([tool_turn] * len(tool) + [np.eye(3)] * len(others)).reshape(len(rows), 3, 3),
+        places=np.array([profile.tip] * len(tool) + [np.zeros(3)] * len(others)).reshape(len(rows), 3),
+        carried=np.array(
+            [len(carriers) - 1] * len(tool) + [carriers.index(body.carried_by) for body in others], dtype=np.int64
+        ),
+        nozzle=np.array([True] * len(tool) + [False] * len(others), dtype=np.bool_),
+        names=(*(solid.name for solid in tool), *(body.solid.name for body in others)),
         corner=corner,
         ground=ground,
         floor=-profile.bed.thickness,

@@ -112,8 +112,14 @@ def sweep(
         clearance, poses = min(clearance, near), poses + looked
         row, body = np.nonzero(worst < 0.0)
         parts.append((row.astype(np.int64) - 1 + low, body.astype(np.int64), -worst[row, body], where[row, body]))
-    found = [np.concatenate([part[column] for part in parts]) for column in range(4)]
-    return Hits(*found, math.inf if clearance >= FAR else float(clearance), int(poses))
+    return Hits(
+        rows=np.concatenate([part[0] for part in parts]),
+        body=np.concatenate([part[1] for part in parts]),
+        depth=np.concatenate([part[2] for part in parts]),
+        points=np.concatenate([part[3] for part in parts]),
+        clearance=math.inf if clearance >= FAR else float(clearance),
+        poses=int(poses),
+    )
 
 
 @njit(cache=True)
@@ -259,6 +265,14 @@ def _nearest(row, middle, radius, rotation, shift, press, lean, cells, blocks, t
     ax, ay, az = rotation[0, 2], rotation[1, 2], rotation[2, 2]
     best = want
     reach = radius + max(want, 0.0)
+    # the body's lowest point is no lower than this: a long beam lies high although its sphere does not
+    if row[0] == 0.0:
+        half_x = half_y = max(row[5], row[6])
+        half_z = (row[4] - row[3]) / 2.0
+    else:
+        half_x, half_y, half_z = (row[4] - row[1]) / 2.0, (row[5] - row[2]) / 2.0, (row[6] - row[3]) / 2.0
+    extent = abs(rotation[2, 0]) * half_x + abs(rotation[2, 1]) * half_y + abs(rotation[2, 2]) * half_z
+    lowest = mz - min(radius, extent) - max(want, 0.0)
     tile = CELL * block * block
     left, low_y = corner[0] - CELL / 2, corner[1] - CELL / 2
     first_i = max(int((mx - reach - left) // tile), 0)
@@ -268,15 +282,20 @@ def _nearest(row, middle, radius, rotation, shift, press, lean, cells, blocks, t
     half_block = 0.7071067811865476 * CELL * block
     for ti in range(first_i, last_i + 1):
         for tj in range(first_j, last_j + 1):
-            if tiles[ti, tj] < floor or tiles[ti, tj] < mz - reach:
+            if tiles[ti, tj] < floor or tiles[ti, tj] < lowest:
                 continue
+            if radius > tile:
+                tx, ty = left + (ti + 0.5) * tile, low_y + (tj + 0.5) * tile
+                near, _ = _column(row, rotation, shift, tx, ty, floor, tiles[ti, tj])
+                if near > best + half_block * block:
+                    continue
             for bi in range(ti * block, ti * block + block):
                 bx = left + (bi + 0.5) * CELL * block
                 if abs(bx - mx) > reach + half_block:
                     continue
                 for bj in range(tj * block, tj * block + block):
                     high = blocks[bi, bj]
-                    if high < floor or high < mz - reach:
+                    if high < floor or high < lowest:
                         continue
                     by = low_y + (bj + 0.5) * CELL * block
                     if (bx - mx) ** 2 + (by - my) ** 2 > (reach + half_block) ** 2:
