@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.errors import GcodeError
 from trunnion_core.profile import MachineProfile
 
 from trunnion_sim import motion_kernel as kernel
@@ -103,9 +104,15 @@ KEPT = (
 )
 """Non-motion commands whose words matter later."""
 
+MOST_ROWS = 3_000_000
+"""Motions of one program: judging needs about 0.6 kB for each, and 2 GB should do."""
+
 
 def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) -> Motion:
-    """Run the modal state over every block. Never raises: what cannot be understood is in `dropped`."""
+    """Run the modal state over every block; what cannot be understood is in `dropped`.
+
+    Raises GcodeError where there are more than MOST_ROWS motions.
+    """
     k = len(profile.joints)
     letters = np.array([ord(letter) for letter in profile.letters], np.int64)
     rotary = np.array([joint.rotary for joint in profile.joints])
@@ -132,6 +139,11 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
             )  # fmt: skip
             parts.append(kernel.joined([out], made))
             rows += made
+            if rows > MOST_ROWS:
+                raise GcodeError(
+                    f"line {int(block.line[at - 1])}: here the program has more than {MOST_ROWS:,} motions, "
+                    "which is the most that is judged in one piece; split it"
+                )
         _collect(block, row_of_command, commands, first_line, count)
         for code, reason in kernel.PROBLEMS.items():
             hit = block.line[problem == code]

@@ -172,3 +172,11 @@ def test_programs_of_other_slicers_name_their_roles(tmp_path: Path) -> None:
     rows = context_of(write(tmp_path / "a.gcode", *lines), PLAIN).rows
     assert rows.role[1:].tolist() == [3, 5, 7]
     assert rows.layer.tolist() == [-1, 0, 0, 1]
+
+
+def test_a_program_with_too_many_motions_is_one_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("trunnion_sim.motion.MOST_ROWS", 1000)
+    path = tmp_path / "long.gcode"
+    path.write_text("G28\nG90\n" + "G1 X1 F600\nG1 X2\n" * 600)
+    with pytest.raises(GcodeError, match="more than 1,000 motions"):
+        judge(path, load_profile("generic_3axis"))
