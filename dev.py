@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Set up Trunnion in a fresh checkout and run it: needs Python 3.11 or newer with pip, nothing else.
 
-    python3 dev.py demo [...]      a sample part from mesh to printed on the software machine
-    python3 dev.py test [...]      the test suite (further words go to pytest)
-    python3 dev.py browser [...]   the tests that need chromium
-    python3 dev.py lint            formatting, lint, types and import rules
-    python3 dev.py run WORDS...    the trunnion command with those words
-    python3 dev.py lock            write requirements/*.txt anew from pyproject.toml
+python3 dev.py demo [...]      a sample part from mesh to printed on the software machine
+python3 dev.py test [...]      the test suite (further words go to pytest)
+python3 dev.py browser [...]   the tests that need chromium
+python3 dev.py lint            formatting, lint, types and import rules
+python3 dev.py run WORDS...    the trunnion command with those words
+python3 dev.py lock            write requirements/*.txt anew from pyproject.toml
 """
 
 import hashlib
@@ -24,7 +24,7 @@ PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
 
 def main(words: list[str]) -> int:
     """Run one of the commands of the module's docstring; the exit status is that of what was run."""
-    if sys.version_info < (3, 11):
+    if sys.version_info < (3, 11):  # noqa: UP036  (this file is what an older Python would meet first)
         print(f"dev.py: this is Python {sys.version.split()[0]}; Trunnion needs 3.11 or newer", file=sys.stderr)
         return 2
     command, rest = (words[0], words[1:]) if words else ("", [])
@@ -72,14 +72,14 @@ def install(kind: str) -> None:
 
 
 def lock() -> int:
-    """Resolve pyproject.toml into pinned, hashed requirements: run.txt for users, dev.txt with the developers' tools."""
+    """Resolve pyproject.toml into pinned, hashed requirements: run.txt for users, dev.txt with developers' tools."""
     install("dev")
     check(PYTHON, "-m", "pip", "install", "--quiet", "uv")
-    compiled = (PYTHON, "-m", "uv", "pip", "compile", "--quiet", "--universal", "--generate-hashes", "--no-header")
-    compiled = (*compiled, "--no-annotate", "--python-version", "3.11", ROOT / "pyproject.toml")
-    build = ("--extra", "build")
-    check(*compiled, *build, "-o", ROOT / "requirements" / "run.txt")
-    check(*compiled, *build, "--extra", "dev", "-o", ROOT / "requirements" / "dev.txt")
+    compiled: list[str | Path] = [PYTHON, "-m", "uv", "pip", "compile", "--quiet", "--universal", "--generate-hashes"]
+    compiled += ["--no-header", "--no-annotate", "--python-version", "3.11", ROOT / "pyproject.toml"]
+    compiled += ["--extra", "build"]
+    check(*compiled, "-o", ROOT / "requirements" / "run.txt")
+    check(*compiled, "--extra", "dev", "-o", ROOT / "requirements" / "dev.txt")
     return 0
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from trunnion import samples
 from trunnion.dry_run import check_program
 from trunnion.pipeline import load_part, make_job, write_job

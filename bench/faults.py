@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_host.protocol import HEATERS_OFF, Sender
 from trunnion_host.states import State

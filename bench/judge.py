@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+
 from trunnion_core.bead import bead_area
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_kinematics.branches import choose

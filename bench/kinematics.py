@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.profile import MachineProfile, load_profile, profile_from_file
 from trunnion_core.profile_file import ProfileFile

@@ -14,6 +14,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+
 from trunnion_core.profile import load_profile
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_kinematics.branches import choose

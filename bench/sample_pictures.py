@@ -9,6 +9,7 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+
 from trunnion import samples
 from trunnion.pictures import draw_toolpath
 from trunnion.pipeline import make_job, solid_part

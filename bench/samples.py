@@ -3,8 +3,8 @@
     python bench/samples.py [--runs N]
 
 PrusaSlicer is the Debian package prusa-slicer; without it only our own figures are printed. Same meshes, layer 0.3,
-width 0.4, 2 walls, 3 solid layers, 20 % rectilinear infill. Ours does more: non-planar layers, five-axis motion. Times are
-user + system of the finished process as the operating system counts them, start-up included; the runs take turns.
+width 0.4, 2 walls, 3 solid layers, 20 % rectilinear infill. Ours does more: non-planar layers, five-axis motion. Times
+are user + system of the finished process as the operating system counts them, start-up included; the runs take turns.
 """
 
 import argparse
@@ -16,18 +16,19 @@ import sys
 import tempfile
 from pathlib import Path
 
+from trunnion import samples
 from trunnion_slicer.mesh_io import write_stl
 
-from trunnion import samples
-
 WIDTHS = ("", "first-layer-", "perimeter-", "external-perimeter-", "infill-", "solid-infill-", "top-infill-")
-PRUSA = (
-    "prusa-slicer --loglevel 0 --export-gcode --center 200,200 --bed-shape 0x0,400x0,400x400,0x400 "
-    "--max-print-height 400 --nozzle-diameter 0.4 --filament-diameter 1.75 --layer-height 0.3 "
-    "--first-layer-height 0.3 --perimeters 2 --fill-density 20% --fill-pattern rectilinear "
-    "--top-fill-pattern rectilinear --bottom-fill-pattern rectilinear --top-solid-layers 3 --bottom-solid-layers 3 "
-    "--skirts 1 --brim-width 0 --gcode-flavor marlin2 --use-relative-e-distances"
-).split() + ["--before-layer-gcode", "G92 E0", *(word for w in WIDTHS for word in (f"--{w}extrusion-width", "0.4"))]
+OPTIONS = """
+--loglevel 0 --export-gcode --center 200,200 --bed-shape 0x0,400x0,400x400,0x400 --max-print-height 400
+--nozzle-diameter 0.4 --filament-diameter 1.75 --layer-height 0.3 --first-layer-height 0.3 --perimeters 2
+--fill-density 20% --fill-pattern rectilinear --top-fill-pattern rectilinear --bottom-fill-pattern rectilinear
+--top-solid-layers 3 --bottom-solid-layers 3 --skirts 1 --brim-width 0 --gcode-flavor marlin2
+--use-relative-e-distances
+"""
+WIDTH_OPTIONS = [word for kind in WIDTHS for word in (f"--{kind}extrusion-width", "0.4")]
+PRUSA = ["prusa-slicer", *OPTIONS.split(), "--before-layer-gcode", "G92 E0", *WIDTH_OPTIONS]
 
 
 def main() -> None:
@@ -36,7 +37,10 @@ def main() -> None:
     options.add_argument("--runs", type=int, default=3)
     runs = options.parse_args().runs
     prusa = shutil.which("prusa-slicer") is not None
-    print(f"{'sample':12}{'ours s':>9}{'MiB':>7}{'planar s':>9}{'MiB':>7}{'prusa s':>9}{'MiB':>7}{'ours/p':>9}{'planar/p':>9}")
+    print(
+        f"{'sample':12}{'ours s':>9}{'MiB':>7}{'planar s':>9}{'MiB':>7}"
+        f"{'prusa s':>9}{'MiB':>7}{'ours/p':>9}{'planar/p':>9}"
+    )
     with tempfile.TemporaryDirectory() as folder:
         for name in samples.names():
             model = Path(folder) / f"{name}.stl"
@@ -50,7 +54,9 @@ def main() -> None:
             for _ in range(runs):
                 for key, command in rows.items():
                     results[key].append(measure(command))
-            medians = {key: [statistics.median(column) for column in zip(*r, strict=True)] for key, r in results.items()}
+            medians = {
+                key: [statistics.median(column) for column in zip(*r, strict=True)] for key, r in results.items()
+            }
             text = f"{name:12}" + "".join(f"{cpu:9.2f}{mib:7.0f}" for cpu, mib in medians.values())
             if prusa:
                 base = medians["prusa"][0]

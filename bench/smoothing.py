@@ -14,6 +14,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+
 from trunnion import samples
 from trunnion.pipeline import settings_for, solid_part
 from trunnion_core.arrays import BoolArray, FloatArray

@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 import ruckig
 from scipy.interpolate import CubicSpline
+
 from trunnion_motion.jerk_law import jerk_law
 from trunnion_motion.scurve import rest_to_rest
 from trunnion_motion.timelaw import time_law

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_core.settings import PrintSettings

@@ -4,6 +4,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, check_array
 from trunnion_core.errors import FileProblem
 

@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+from trunnion.header import placement, read_header
 from trunnion_core.mesh import Mesh
 from trunnion_core.profile import MachineProfile
 from trunnion_core.settings import PrintSettings
@@ -11,8 +12,6 @@ from trunnion_sim.report import Report
 from trunnion_slicer.mesh_io import load_mesh
 from trunnion_slicer.placement import place, turn
 from trunnion_slicer.repair import make_solid
-
-from trunnion.header import placement, read_header
 
 
 def check_program(program: Path, profile: MachineProfile, model: Path | None = None) -> Report:

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from trunnion.pictures import DEVIATION_RANGE, ROLE_COLOURS
 from trunnion_core.profile import MachineProfile
 from trunnion_core.profile_file import CylinderTable
 from trunnion_core.roles import Role
 from trunnion_sim.report import Report
-
-from trunnion.pictures import DEVIATION_RANGE, ROLE_COLOURS
 
 PARTS = Path(__file__).parent / "report_page"
 MOST_ROWS = 600_000

@@ -10,6 +10,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.findings import Finding
 from trunnion_core.mesh import Mesh

@@ -4,6 +4,8 @@ import math
 from pathlib import Path
 
 import numpy as np
+
+from trunnion.pipeline import settings_for
 from trunnion_core.profile import MachineProfile
 from trunnion_core.settings import PrintSettings
 from trunnion_motion.fit import Poses
@@ -11,8 +13,6 @@ from trunnion_motion.place import place
 from trunnion_slicer.mesh_io import load_mesh
 from trunnion_slicer.placement import put
 from trunnion_slicer.repair import make_solid
-
-from trunnion.pipeline import settings_for
 
 
 def find_placement(model: Path, profile: MachineProfile, settings: PrintSettings) -> tuple[float, tuple[float, float]]:

@@ -13,6 +13,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
+
 from trunnion_core.profile_file import ProfileFile
 from trunnion_core.settings import PrintSettings
 

@@ -7,9 +7,9 @@ rotary joints alone would get none, and the pressure would jump where it begins 
 """
 
 import numpy as np
+
 from trunnion_core.errors import GcodeError
 from trunnion_core.profile import MachineProfile
-
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.moves import Moves
 from trunnion_gcode.words import number

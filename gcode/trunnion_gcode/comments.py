@@ -7,11 +7,11 @@ Spellings are those of PrusaSlicer, which existing viewers read (`;LAYER_CHANGE`
 from collections.abc import Mapping
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.program import MachineProgram
 from trunnion_core.roles import VIEWER_TYPE, Role
 from trunnion_core.settings import PrintSettings
-
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.moves import Moves
 from trunnion_gcode.words import from_ticks, number, ticks, words

@@ -12,7 +12,6 @@ from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import ProfileError
 from trunnion_core.profile import MachineProfile
 from trunnion_core.validation import nearest
-
 from trunnion_gcode import dialects
 from trunnion_gcode.planner import Planner
 

@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 
 import numpy as np
+
 from trunnion_core.errors import GcodeError
 from trunnion_core.program import Event, EventKind, MachineProgram
 from trunnion_core.settings import PrintSettings
-
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.words import number
 

@@ -4,9 +4,9 @@ With G94, F = 60 * metric / seconds (units a minute); with G93, F = 60 / seconds
 """
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.errors import GcodeError
-
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.moves import Moves
 from trunnion_gcode.words import significant

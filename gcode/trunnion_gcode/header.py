@@ -11,7 +11,6 @@ from pathlib import PurePath
 
 from trunnion_core.profile import MachineProfile
 from trunnion_core.settings import PrintSettings
-
 from trunnion_gcode.words import number
 
 

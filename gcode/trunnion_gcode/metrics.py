@@ -1,6 +1,7 @@
 """How firmwares measure the length of a move, over which they read F."""
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 
 

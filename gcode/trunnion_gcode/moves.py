@@ -7,12 +7,12 @@ as long as leaving out their end bends the path by no more than MERGE_DEVIATION.
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.errors import GcodeError, ProfileError
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
 from trunnion_core.roles import Role
-
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.words import carried_ticks, from_ticks, ticks
 

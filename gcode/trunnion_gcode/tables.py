@@ -1,6 +1,7 @@
 """Which machines a controller with tip control can drive: a turning table on a tilting table, a head in X, Y, Z."""
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import Joint, MachineProfile
 

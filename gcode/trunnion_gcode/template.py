@@ -7,7 +7,6 @@ from trunnion_core.errors import GcodeError
 from trunnion_core.profile import MachineProfile
 from trunnion_core.settings import PrintSettings
 from trunnion_core.validation import nearest
-
 from trunnion_gcode.moves import joint_decimals
 from trunnion_gcode.words import number
 

@@ -7,6 +7,7 @@ read (feed, changes, carried remainders) is computed from ticks, so text and ari
 from collections.abc import Sequence
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.errors import GcodeError
 

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
+
 from trunnion_core.errors import GcodeError
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
 from trunnion_core.settings import PrintSettings
-
 from trunnion_gcode import header
 from trunnion_gcode.advance import advance_lines
 from trunnion_gcode.comments import comments_by_move

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from trunnion_core.errors import StreamError
-
 from trunnion_host.limits import Limits
 from trunnion_host.port import Port
 from trunnion_host.prepare import commands

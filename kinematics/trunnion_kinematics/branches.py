@@ -17,9 +17,9 @@ shortest path in the same spirit.)
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray, freeze
 from trunnion_core.profile import MachineProfile
-
 from trunnion_kinematics.chain import JointChain
 from trunnion_kinematics.reach import LIMIT_SLACK, outside_limits, unreachable
 

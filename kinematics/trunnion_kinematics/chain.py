@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.errors import ProfileError
 from trunnion_core.profile import Joint, MachineProfile
 from trunnion_core.tolerance import PARALLEL_AXES, SAME_TOOL_AXIS_DEG
-
 from trunnion_kinematics.constants import chain_constants
 
 

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 from numba import njit
-from trunnion_core.arrays import FloatArray, IntArray
 
+from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_kinematics.constants import ARM, ARM_TOOL, AZIMUTH, BASIS, COLUMNS, PIVOT, SCALARS
 
 POLE_SINE = 1e-9

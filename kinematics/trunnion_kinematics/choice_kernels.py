@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 from numba import njit
-from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_kinematics.chain_kernels import lean, solve
 from trunnion_kinematics.reach import LIMIT_SLACK
 

@@ -7,6 +7,7 @@ A vector turned about w2 is a + b cos + c sin with constant a, b, c (Rodrigues),
 from typing import TYPE_CHECKING
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:

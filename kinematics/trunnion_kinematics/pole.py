@@ -7,9 +7,9 @@ then takes the tool as near to the wanted axis as it gets, and the linear joints
 """
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.profile import MachineProfile
-
 from trunnion_kinematics.chain import JointChain
 from trunnion_kinematics.reach import outside_limits
 

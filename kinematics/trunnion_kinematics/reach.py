@@ -1,10 +1,10 @@
 """Why a pose is out of reach: the joint that gave up, and by how much."""
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.errors import UnreachableError
 from trunnion_core.profile import MachineProfile
-
 from trunnion_kinematics.chain import JointChain
 
 LIMIT_SLACK = 1e-7

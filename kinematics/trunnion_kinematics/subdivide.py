@@ -8,8 +8,8 @@ piece, stays within the tolerances; their length is never taken as a measure.
 from dataclasses import dataclass
 
 import numpy as np
-from trunnion_core.arrays import BoolArray, FloatArray, IntArray, freeze
 
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray, freeze
 from trunnion_kinematics.chain import JointChain
 
 DEFAULT_AXIS_TOLERANCE = np.radians(0.1)

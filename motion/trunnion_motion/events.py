@@ -1,6 +1,7 @@
 """Turn layers and settings into what happens between motions: heat, fan, layer marks."""
 
 import numpy as np
+
 from trunnion_core.arrays import IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import Event

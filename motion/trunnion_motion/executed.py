@@ -8,13 +8,13 @@ the rows' durations are those of the print.
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.feed import speeds_read
 from trunnion_gcode.moves import Moves, make_moves
-
 from trunnion_motion import executed_kernel as kernel
 from trunnion_motion.timelaw import TimeLaw
 

@@ -5,6 +5,7 @@ Speeds are along the firmware's own length of a move; `share` is what each joint
 
 import numba
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 
 NEARLY_STRAIGHT = 0.999999

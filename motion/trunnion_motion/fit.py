@@ -7,6 +7,7 @@ normals where the surface is flat enough to be printed along them.
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.findings import Finding
 from trunnion_core.mesh import Mesh

@@ -8,6 +8,7 @@ a bowl longer, so that stacked curved layers hold their volume. Nothing here kno
 import math
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.bead import bead_area
 from trunnion_core.toolpath import Toolpath

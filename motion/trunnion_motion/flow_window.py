@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.bead import bead_area
 from trunnion_core.findings import Finding
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
-
 from trunnion_motion.timelaw import BY_WISH, TimeLaw
 
 

@@ -9,6 +9,7 @@ joints go straight and the tip is checked to stay high.
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
 from trunnion_kinematics.chain import JointChain

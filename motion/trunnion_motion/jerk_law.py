@@ -11,8 +11,8 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csr_array, diags_array, vstack
-from trunnion_core.arrays import FloatArray
 
+from trunnion_core.arrays import FloatArray
 from trunnion_motion.topp import PathLaw, law_of_derivatives
 
 ROUNDS = 12

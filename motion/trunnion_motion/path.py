@@ -8,6 +8,7 @@ subdivided so that the tip stays on its chords; at a cut a hop leads over the pa
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.findings import Finding
 from trunnion_core.roles import Role
@@ -15,7 +16,6 @@ from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
 from trunnion_kinematics.branches import PathChoice
 from trunnion_kinematics.subdivide import Subdivision, subdivide
-
 from trunnion_motion.hop import CLEARANCE, HOME_CLEARANCE, Hop, Machine, hop, leave, same_pose_near
 from trunnion_motion.rows import Rows, joined, travelling
 

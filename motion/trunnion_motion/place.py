@@ -9,11 +9,11 @@ whenever trying every grid place with every pose would find one.
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.errors import PlacementError
 from trunnion_core.profile import MachineProfile
 from trunnion_kinematics.chain import JointChain
-
 from trunnion_motion.fit import Poses, fits, joint_states, limit_excess, over_bed
 
 SHIFT_STEP = 5.0

@@ -8,6 +8,7 @@ travels, and the time law gives every row what the slowest joint allows.
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import UnreachableError
 from trunnion_core.findings import Finding
@@ -19,7 +20,6 @@ from trunnion_core.toolpath import Toolpath
 from trunnion_gcode.dialect import find_dialect
 from trunnion_kinematics.branches import PathChoice, choose
 from trunnion_kinematics.chain import JointChain
-
 from trunnion_motion.events import events_for
 from trunnion_motion.executed import executed
 from trunnion_motion.flow import filament_per_row, share

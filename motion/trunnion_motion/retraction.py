@@ -5,8 +5,8 @@ has neither, since the nozzle has printed nothing yet; the last one stays retrac
 """
 
 import numpy as np
-from trunnion_core.roles import Role
 
+from trunnion_core.roles import Role
 from trunnion_motion.rows import Rows, inserted, standing
 
 

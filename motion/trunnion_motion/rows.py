@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.roles import Role
 

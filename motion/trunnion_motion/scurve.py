@@ -6,6 +6,7 @@ Melchiorri 2008, "Trajectory Planning for Automatic Machines and Robots", sectio
 """
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 
 STILL_TIP = 1e-6

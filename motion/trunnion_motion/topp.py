@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 
 

@@ -8,9 +8,9 @@ such a jump has no duration here and no flow.
 """
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
-
 from trunnion_sim.motion import Motion
 from trunnion_sim.replay import Replay
 

@@ -5,6 +5,7 @@ sees the nozzle through the inverse of its own side (product of exponentials; Mu
 """
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import Joint, MachineProfile
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.findings import Finding, Severity
 from trunnion_core.profile import Joint, MachineProfile
 from trunnion_core.roles import Role
-
 from trunnion_sim import motion_kernel
 from trunnion_sim.chain import forward
 from trunnion_sim.collision.scene import Scene, make_scene

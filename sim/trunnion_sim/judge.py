@@ -5,13 +5,13 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.errors import GcodeError
 from trunnion_core.findings import Finding
 from trunnion_core.mesh import Mesh
 from trunnion_core.profile import MachineProfile
 from trunnion_core.trace import Trace
-
 from trunnion_sim.chain import forward
 from trunnion_sim.context import Context, LineOddities
 from trunnion_sim.limits import limits_of

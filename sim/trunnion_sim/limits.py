@@ -8,9 +8,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
-
 from trunnion_sim.motion import Command, Motion
 
 

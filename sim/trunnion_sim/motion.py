@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.errors import GcodeError
 from trunnion_core.profile import MachineProfile
-
 from trunnion_sim import motion_kernel as kernel
 from trunnion_sim.reader import Block
 from trunnion_sim.rules import Rules

@@ -12,9 +12,9 @@ from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.errors import GcodeError
-
 from trunnion_sim import reader_kernel as kernel
 
 CHUNK = 1 << 20

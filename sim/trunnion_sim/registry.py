@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from types import ModuleType
 
 from trunnion_core.findings import Finding, Severity
-
 from trunnion_sim import checks
 from trunnion_sim.context import Context
 

@@ -7,9 +7,9 @@ over the length that the firmware reads F along. Joints and filament run linearl
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
-
 from trunnion_sim import motion_kernel, replay_kernel, toolhead_kernel
 from trunnion_sim.limits import Limits
 from trunnion_sim.motion import Motion

@@ -10,7 +10,6 @@ from typing import Literal
 
 from trunnion_core.errors import ProfileError
 from trunnion_core.validation import nearest
-
 from trunnion_sim import firmwares
 
 

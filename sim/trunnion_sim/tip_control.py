@@ -10,9 +10,9 @@ rotary joints come from the profile: the branches of the fork disagree on them.
 from collections.abc import Mapping
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
-
 from trunnion_sim import tip_kernel
 from trunnion_sim.tip_kernel import Geometry
 

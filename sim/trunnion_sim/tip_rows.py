@@ -8,9 +8,9 @@ tolerance stay whole.
 """
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
-
 from trunnion_sim.chain import forward
 
 MOST_OFF = 0.05

@@ -1,13 +1,13 @@
 """Layers of unordered beads become one toolpath: order, travels, speeds."""
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import MeshError
 from trunnion_core.layers import Bead, LayerStack
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
-
 from trunnion_slicer.order import ordered
 from trunnion_slicer.printed import PrintedHeights
 from trunnion_slicer.travel import Travel, arrival, travel

@@ -1,6 +1,7 @@
 """Plane centre lines become beads: the same width, height and upright tool all along."""
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.layers import Bead
 from trunnion_core.roles import Role

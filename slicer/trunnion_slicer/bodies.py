@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.mesh import Mesh
 

@@ -7,6 +7,7 @@ flat hole becomes flat again. A hole is filled if it is flat, or small against t
 from dataclasses import dataclass
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.tolerance import FLAT_HOLE
 

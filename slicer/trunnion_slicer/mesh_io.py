@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.errors import MeshError
 from trunnion_core.findings import Finding, Severity
 from trunnion_core.mesh import Mesh
-
 from trunnion_slicer.stl import read_stl, write_stl
 from trunnion_slicer.threemf import read_3mf
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from shapely.geometry import GeometryCollection, LineString, Polygon
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.layers import Bead, Layer
 from trunnion_core.roles import Role
-
 from trunnion_slicer.beads import reversed_bead, started_at
 
 SEAM_REACH = 2.0

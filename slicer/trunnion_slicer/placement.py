@@ -1,6 +1,7 @@
 """A solid part onto the bed: the middle of the bed by default, else where its file says, and the check that it fits."""
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import PlacementError
 from trunnion_core.mesh import Mesh

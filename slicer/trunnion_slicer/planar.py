@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry import MultiPolygon
+
 from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.bead import bead_spacing, bead_width
 from trunnion_core.errors import MeshError, PlacementError
@@ -20,7 +21,6 @@ from trunnion_core.mesh import Mesh
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 from trunnion_core.tolerance import WELD_DISTANCE
-
 from trunnion_slicer.beads import flat_bead
 from trunnion_slicer.infill import fill, require
 from trunnion_slicer.remarks import lost, unsupported

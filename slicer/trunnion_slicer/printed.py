@@ -1,6 +1,7 @@
 """How high the printed part stands so far, over a grid seen from above."""
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.layers import Bead
 

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPolygon, Polygon
+
 from trunnion_core.findings import Finding
 from trunnion_core.layers import Layer
 from trunnion_core.roles import Role
-
 from trunnion_slicer.order import islands_of
 
 SLIVER = 0.05

@@ -6,12 +6,12 @@ inside out are turned; bodies that overlap are united. A clean mesh passes with 
 """
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.errors import MeshError
 from trunnion_core.findings import Finding, Severity
 from trunnion_core.mesh import Mesh
 from trunnion_core.tolerance import GAP_CLOSING, WELD_DISTANCE
-
 from trunnion_slicer.bodies import manifold_of, mesh_of, outward, united, volumes
 from trunnion_slicer.holes import find_holes
 from trunnion_slicer.winding import Edges, consistent_winding, find_edges

@@ -2,6 +2,7 @@
 
 import numpy as np
 from numba import njit
+
 from trunnion_core.arrays import FloatArray, IntArray
 
 

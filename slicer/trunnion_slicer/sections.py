@@ -14,6 +14,7 @@ import manifold3d
 import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.errors import MeshError
 from trunnion_core.mesh import Mesh

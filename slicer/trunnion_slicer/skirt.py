@@ -3,11 +3,11 @@
 import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon
+
 from trunnion_core.bead import bead_spacing
 from trunnion_core.layers import Bead
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
-
 from trunnion_slicer.beads import flat_bead
 from trunnion_slicer.sections import SIMPLIFY
 from trunnion_slicer.walls import as_multipolygon

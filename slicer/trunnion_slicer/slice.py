@@ -10,7 +10,6 @@ from trunnion_core.mesh import Mesh
 from trunnion_core.profile_file import SolidTable
 from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
-
 from trunnion_slicer.assemble import to_toolpath
 from trunnion_slicer.nonplanar.plan import plan_nonplanar
 from trunnion_slicer.planar import plan_planar

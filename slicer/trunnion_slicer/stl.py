@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import MeshError
 from trunnion_core.findings import Finding

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
-from trunnion_core.arrays import BoolArray, FloatArray
 
+from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_slicer.walls import as_multipolygon, offset, opened
 
 SAMPLE = 0.1

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.layers import Bead
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
-
 from trunnion_slicer.printed import PrintedHeights
 
 CORRIDOR = 1.0

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
+
 from trunnion_core.arrays import FloatArray
 
 CLOSEST_RUNS = 0.6

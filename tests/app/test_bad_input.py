@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trunnion_core.mesh import Mesh
 from trunnion_core.profile import shipped_profiles
 from trunnion_slicer.mesh_io import write_stl

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trunnion.cli import COMMANDS
 from trunnion_core.profile import load_profile
 

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+
 from trunnion.agreement import agreement, on_firmware
 from trunnion_core.errors import ProfileError
 from trunnion_core.profile import load_profile

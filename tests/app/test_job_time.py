@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trunnion import samples
 from trunnion.agreement import on_firmware
 from trunnion.pipeline import make_job, solid_part, write_job

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+
 from trunnion import samples
 from trunnion.dry_run import check_program
 from trunnion.html_report import report_page

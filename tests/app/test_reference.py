@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from trunnion.reference import pages, profile_schema
 from trunnion_core.profile_file import JointTable, ProfileFile
 from trunnion_core.settings import PrintSettings

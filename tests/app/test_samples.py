@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+
 from trunnion import samples
 from trunnion_core.settings import PrintSettings
 from trunnion_slicer.bodies import manifold_of, volumes

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from trunnion import samples
 from trunnion.dry_run import check_program
 from trunnion.pipeline import Job, make_job, solid_part, write_job

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
+
 from trunnion import samples
 from trunnion.dry_run import check_program
 from trunnion.html_report import report_page

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from trunnion_core.arrays import check_array, check_unit_rows, freeze
 from trunnion_core.bead import bead_area, bead_spacing, bead_width
 from trunnion_core.mesh import Mesh

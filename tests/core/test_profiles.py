@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+
 from trunnion_core.errors import ProfileError
 from trunnion_core.profile import load_profile, shipped_profiles
 

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+
 from trunnion_core.errors import SettingsError
 from trunnion_core.settings_file import load_settings
 

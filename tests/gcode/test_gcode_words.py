@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from trunnion_core.errors import GcodeError
 from trunnion_gcode.words import carried_ticks, from_ticks, number, significant, ticks, words
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import GcodeError, ProfileError
 from trunnion_core.profile import MachineProfile, load_profile

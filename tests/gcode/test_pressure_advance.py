@@ -5,6 +5,7 @@ import io
 
 import numpy as np
 import pytest
+
 from trunnion_core.errors import GcodeError
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_core.program import MachineProgram

@@ -1,6 +1,7 @@
 """Every fault of the wire and the firmware, injected by the software machine; the host is driven in its own time."""
 
 import pytest
+
 from trunnion_core.profile import load_profile
 from trunnion_host.protocol import HEATERS_OFF, Sender
 from trunnion_host.states import State

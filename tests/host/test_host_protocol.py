@@ -7,6 +7,7 @@ from random import Random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from trunnion_core.errors import StreamError
 from trunnion_host.limits import Limits
 from trunnion_host.prepare import MAX_LINE, commands

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trunnion_core.errors import StreamError
 from trunnion_core.profile import load_profile
 from trunnion_host.limits import Limits

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from trunnion_core.profile import MachineProfile, load_profile, profile_from_file
 from trunnion_core.profile_file import ProfileFile
 

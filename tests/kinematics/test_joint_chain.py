@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+
 from trunnion_core.errors import ProfileError
 from trunnion_core.profile import load_profile
 from trunnion_core.tolerance import ROUND_TRIP

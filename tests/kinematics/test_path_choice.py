@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+
 from trunnion_core.errors import UnreachableError
 from trunnion_core.profile import load_profile
 from trunnion_kinematics.branches import EARLY_COST, EXTRUDING_WEIGHT, REWIND_COST, STRAY, TURNING_WEIGHT, choose

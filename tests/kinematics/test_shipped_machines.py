@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+
 from trunnion_core.profile import load_profile, shipped_profiles
 from trunnion_kinematics.branches import choose
 from trunnion_kinematics.chain import JointChain

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from trunnion_core.profile import load_profile, profile_from_file
 from trunnion_core.profile_file import ProfileFile
 from trunnion_core.roles import Role

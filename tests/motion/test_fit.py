@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from trunnion_core.errors import PlacementError
 from trunnion_core.mesh import Mesh
 from trunnion_core.profile import load_profile

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+
 from trunnion_core.roles import Role
 from trunnion_core.toolpath import Toolpath
 from trunnion_motion.flow import bead_volume, filament_per_row, share

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline, make_interp_spline
+
 from trunnion_motion.jerk_law import jerk_law, joint_motion
 from trunnion_motion.scurve import rest_to_rest
 from trunnion_motion.topp import toppra_law

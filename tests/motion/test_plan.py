@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+
 from trunnion_core.errors import UnreachableError
 from trunnion_core.profile import load_profile
 from trunnion_core.roles import Role

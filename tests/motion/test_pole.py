@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+
 from trunnion_core.profile import load_profile
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import ruckig
 from numpy.testing import assert_allclose
+
 from trunnion_motion.scurve import rest_to_rest, s_curve_times
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+
 from trunnion_motion.timelaw import BY_WISH, speeds_at, time_law
 
 SPEED = np.array([200.0, 150.0, 40.0, 3.0, 3.0])

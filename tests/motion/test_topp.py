@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
+
 from trunnion_motion.topp import spline_derivatives, toppra_law
 
 with warnings.catch_warnings():

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
+
 from trunnion_core.profile import MachineProfile, profile_from_file, shipped_profiles
 from trunnion_core.profile_file import ProfileFile
 from trunnion_sim.chain import forward, side_matrices

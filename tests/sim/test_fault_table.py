@@ -6,6 +6,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+
 from trunnion_sim.firmware.faults import KINDS
 
 ROOT = Path(__file__).parents[2]

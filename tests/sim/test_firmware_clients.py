@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from trunnion_core.profile import load_profile
 from trunnion_sim.firmware.faults import parse_fault
 from trunnion_sim.firmware.machine import SoftwareMachine

@@ -5,6 +5,7 @@ from operator import xor
 from typing import Any
 
 import pytest
+
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_sim.firmware.machine import SoftwareMachine
 

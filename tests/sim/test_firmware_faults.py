@@ -7,6 +7,7 @@ from operator import xor
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_sim.firmware.faults import KINDS, FaultError, parse_fault
 from trunnion_sim.firmware.machine import SoftwareMachine

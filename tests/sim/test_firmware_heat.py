@@ -3,6 +3,7 @@
 import math
 
 import pytest
+
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_sim.firmware.faults import parse_fault
 from trunnion_sim.firmware.heat import Heater, hotend

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_sim.firmware.planner import FIRST_MOVE_DELAY, Planner
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import serial
+
 from trunnion_core.errors import StreamError
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_sim.firmware.faults import parse_fault

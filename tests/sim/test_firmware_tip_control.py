@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_sim.chain import forward
 from trunnion_sim.firmware.machine import SoftwareMachine

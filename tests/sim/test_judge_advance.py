@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trunnion_core.profile import load_profile
 from trunnion_sim.advance import advance, flow
 from trunnion_sim.judge import context_of

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_core.roles import Role
 from trunnion_sim.context import Context

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trunnion_core.bead import bead_area, bead_spacing
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_sim.judge import judge

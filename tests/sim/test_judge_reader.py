@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trunnion_core.errors import GcodeError
 from trunnion_core.profile import load_profile
 from trunnion_sim.chain import forward

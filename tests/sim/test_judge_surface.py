@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from trunnion_core.bead import bead_area, bead_spacing
 from trunnion_core.mesh import Mesh
 from trunnion_sim.report import SurfaceReport

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.bead import bead_spacing, bead_width
 from trunnion_core.layers import Layer

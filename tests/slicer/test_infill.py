@@ -8,6 +8,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon, box
+
 from trunnion_core.errors import SettingsError
 from trunnion_slicer import infill
 from trunnion_slicer.walls import as_multipolygon

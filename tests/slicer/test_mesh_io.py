@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 from numpy.testing import assert_allclose, assert_array_equal
+
 from trunnion_core.errors import MeshError
 from trunnion_core.mesh import Mesh
 from trunnion_slicer.bodies import mesh_of

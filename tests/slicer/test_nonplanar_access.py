@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from trunnion_core.mesh import Mesh
 from trunnion_core.profile_file import BoxTable, ConeTable, CylinderTable
 from trunnion_core.settings import PrintSettings

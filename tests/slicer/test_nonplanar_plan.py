@@ -7,6 +7,7 @@ import manifold3d
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.bead import bead_area
 from trunnion_core.layers import Bead, Layer

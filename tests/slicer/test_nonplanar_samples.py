@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+
 from trunnion import samples
 from trunnion_core.mesh import Mesh
 from trunnion_core.settings import PrintSettings

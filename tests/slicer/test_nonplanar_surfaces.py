@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.mesh import Mesh
 from trunnion_slicer.nonplanar.grid import build_grid

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+
 from trunnion_core.errors import PlacementError
 from trunnion_core.mesh import Mesh
 from trunnion_core.profile import load_profile

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import shapely
 from shapely.geometry import LineString, Point, box
+
 from trunnion_core.bead import bead_area
 from trunnion_core.errors import MeshError, PlacementError, SettingsError
 from trunnion_core.layers import Bead, Layer

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from manifold3d import Manifold
 from numpy.testing import assert_allclose, assert_array_equal
+
 from trunnion_core.errors import MeshError
 from trunnion_core.mesh import Mesh
 from trunnion_slicer.bodies import manifold_of, mesh_of, volumes

@@ -4,8 +4,9 @@ import manifold3d as m3
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+
 from trunnion_core.errors import MeshError
 from trunnion_core.mesh import Mesh
 from trunnion_slicer.sections import SIMPLIFY, contours, sections
@@ -44,6 +45,8 @@ def solids(draw: st.DrawFn) -> m3.Manifold:
 @given(solids(), st.lists(st.floats(-9, 9), min_size=1, max_size=5))
 def test_areas_agree_with_manifolds_own_slices(solid: m3.Manifold, heights: list[float]) -> None:
     mesh = to_mesh(solid)
+    # on a face's own plane ours is the section just below, manifold3d's the one just above
+    assume(np.abs(mesh.vertices[:, 2] - np.array(heights)[:, None]).min(initial=1.0) > 1e-6)
     points, starts, planes = contours(mesh, np.array(heights))
     exact = np.zeros(len(heights))
     for i, plane in enumerate(planes):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize
+
 from trunnion import samples
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings

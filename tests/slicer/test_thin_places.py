@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import shapely
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon, box
+
 from trunnion_core.bead import bead_area
 from trunnion_core.mesh import Mesh
 from trunnion_core.roles import Role

@@ -9,6 +9,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString
+
 from trunnion_core.bead import bead_area
 from trunnion_core.errors import MeshError
 from trunnion_core.layers import Bead, Layer, LayerStack

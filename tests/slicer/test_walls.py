@@ -6,6 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LinearRing, LineString, MultiPolygon, Point, Polygon, box
+
 from trunnion_slicer.walls import walls
 
 WIDTH, SPACING = 0.4, 0.336

@@ -17,11 +17,11 @@ def command(joints: Path, machine: str, output: Path) -> None:
     Writes points (n, 3) in mm and tool_axes (n, 3), in the part frame.
     """
     import numpy as np
-    from trunnion_core.profile import load_profile
-    from trunnion_kinematics.chain import JointChain
 
     from trunnion.arrays_file import read_arrays
     from trunnion.output import whole_file
+    from trunnion_core.profile import load_profile
+    from trunnion_kinematics.chain import JointChain
 
     profile = load_profile(machine)
     (values,) = read_arrays(joints, joints=(None, len(profile.joints)))

@@ -18,11 +18,11 @@ def command(poses: Path, machine: str, output: Path) -> None:
     and singularity (n,), the absolute determinant of the orientation Jacobian, 0 at a pole.
     """
     import numpy as np
-    from trunnion_core.profile import load_profile
-    from trunnion_kinematics.chain import JointChain
 
     from trunnion.arrays_file import read_arrays, unit_rows
     from trunnion.output import whole_file
+    from trunnion_core.profile import load_profile
+    from trunnion_kinematics.chain import JointChain
 
     profile = load_profile(machine)
     points, axes = read_arrays(poses, points=(None, 3), tool_axes=(None, 3))

@@ -17,11 +17,10 @@ def command(model: Path, machine: str, settings_file: Path | None, words: tuple[
     Prints the settings to slice with. Exit status: 0 found, 1 no place does (it says which joint gives up where),
     2 misuse.
     """
+    from trunnion.placing import find_placement
     from trunnion_core.errors import PlacementError
     from trunnion_core.profile import load_profile
     from trunnion_core.settings_file import load_settings
-
-    from trunnion.placing import find_placement
 
     profile = load_profile(machine)
     settings = load_settings(settings_file, words)

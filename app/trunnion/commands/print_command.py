@@ -20,11 +20,10 @@ def command(program: Path, machine: str, port: str, baud: int | None) -> None:
     import signal
     import threading
 
-    from trunnion_core.errors import StreamError
-    from trunnion_core.profile import load_profile
-
     from trunnion.printing import open_printer, print_program
     from trunnion.progress import Progress
+    from trunnion_core.errors import StreamError
+    from trunnion_core.profile import load_profile
 
     profile = load_profile(machine)
     stop = threading.Event()

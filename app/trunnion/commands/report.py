@@ -5,9 +5,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from trunnion_core.findings import Finding
-
     from trunnion.pipeline import Timings
+    from trunnion_core.findings import Finding
 
 SHOWN_PER_CODE = 5
 """Findings of one code that are printed; the rest are counted."""

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.mesh import Mesh
 

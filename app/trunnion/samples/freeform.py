@@ -3,10 +3,10 @@
 from typing import Any
 
 import numpy as np
-from trunnion_core.arrays import FloatArray
-from trunnion_core.mesh import Mesh
 
 from trunnion.samples._solids import dome
+from trunnion_core.arrays import FloatArray
+from trunnion_core.mesh import Mesh
 
 SETTINGS: dict[str, Any] = {}
 

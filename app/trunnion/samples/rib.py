@@ -3,9 +3,9 @@
 from typing import Any
 
 import numpy as np
-from trunnion_core.mesh import Mesh
 
 from trunnion.samples._solids import from_manifold
+from trunnion_core.mesh import Mesh
 
 SETTINGS: dict[str, Any] = {}
 

@@ -3,10 +3,10 @@
 from typing import Any
 
 import numpy as np
-from trunnion_core.arrays import FloatArray
-from trunnion_core.mesh import Mesh
 
 from trunnion.samples._solids import dome, from_manifold, sheet, to_manifold
+from trunnion_core.arrays import FloatArray
+from trunnion_core.mesh import Mesh
 
 SETTINGS: dict[str, Any] = {"nonplanar_smoothing": 0}
 """At the ring's rim the slope turns within a millimetre; a tool that lags behind it touches the rim's own wall."""

@@ -6,9 +6,9 @@ line numbers and checksums.
 """
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
-
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.planner import Planner
 

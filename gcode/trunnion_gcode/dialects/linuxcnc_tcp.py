@@ -8,7 +8,6 @@ all the other way with the pin conventional-directions. The filament is a U axis
 import dataclasses
 
 from trunnion_core.profile import MachineProfile
-
 from trunnion_gcode.dialects import linuxcnc
 from trunnion_gcode.tables import pivots, table_problem, turning_signs
 from trunnion_gcode.words import number

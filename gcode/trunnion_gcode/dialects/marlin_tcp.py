@@ -9,7 +9,6 @@ the profile's and have to be checked on the machine.
 import functools
 
 from trunnion_core.profile import MachineProfile
-
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.dialects.marlin import SHORTEST_LINEAR
 from trunnion_gcode.metrics import linear_first

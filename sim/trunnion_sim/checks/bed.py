@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.findings import Finding
 from trunnion_core.profile_file import BedTable
-
 from trunnion_sim.context import Context
 
 CODES = {

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-from trunnion_core.findings import Finding
 
+from trunnion_core.findings import Finding
 from trunnion_sim.context import Context
 
 CODES = {

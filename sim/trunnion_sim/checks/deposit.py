@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.findings import Finding
-
 from trunnion_sim.context import Context
 
 CODES = {

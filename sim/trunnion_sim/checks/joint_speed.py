@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.findings import Finding
 from trunnion_core.profile import Joint
-
 from trunnion_sim.context import Context
 
 CODES = {

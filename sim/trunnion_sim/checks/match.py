@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import PurePath
 
 from trunnion_core.findings import Finding
-
 from trunnion_sim.context import Context
 
 CODES = {

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
+
 from trunnion_core.findings import Finding, Severity
 from trunnion_core.validation import nearest
-
 from trunnion_sim import reader_kernel as reading
 from trunnion_sim.context import Context
 from trunnion_sim.motion import code_name

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 from numba import njit
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile_file import BoxTable, ConeTable, CylinderTable
 

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_sim.collision.material import raise_bead
 from trunnion_sim.collision.scene import BLOCK, CELL, Scene
 from trunnion_sim.collision.solids import signed_distance

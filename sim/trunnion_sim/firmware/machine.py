@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
+
 from trunnion_core.profile import MachineProfile
 from trunnion_core.trace import Trace
-
 from trunnion_sim.firmware import replies
 from trunnion_sim.firmware.answers import Answers
 from trunnion_sim.firmware.dispatch import dispatch

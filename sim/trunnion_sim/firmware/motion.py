@@ -8,8 +8,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from trunnion_core.profile import MachineProfile
 
+from trunnion_core.profile import MachineProfile
 from trunnion_sim.tip_control import tip_control_of
 
 STARTING_FEED = 25.0

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
-
 from trunnion_sim.firmware import planner_kernel as kernel
 
 if TYPE_CHECKING:

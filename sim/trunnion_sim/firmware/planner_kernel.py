@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 from numba import njit
+
 from trunnion_core.arrays import FloatArray
 
 MIN_SPEED = 0.05

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from trunnion_core.errors import StreamError
-
 from trunnion_sim.firmware.embedded import EmbeddedPort, Pace
 from trunnion_sim.firmware.machine import SoftwareMachine
 

@@ -10,9 +10,9 @@ import math
 
 import igl
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.mesh import Mesh
-
 from trunnion_sim.report import SurfaceReport
 from trunnion_sim.surface import compare_kernel
 from trunnion_sim.surface.deposit import Field

@@ -35,8 +35,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from trunnion_core.arrays import BoolArray, FloatArray, IntArray, check_array
 
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray, check_array
 from trunnion_sim.surface import deposit_kernel
 
 MOST_CELLS = 24_000_000

@@ -12,6 +12,7 @@ from trunnion_core.validation import nearest
 
 if TYPE_CHECKING:
     from shapely.geometry import MultiPolygon
+
     from trunnion_core.arrays import FloatArray
 
     Fill = Callable[..., list[FloatArray]]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from shapely.geometry import MultiPolygon, Polygon
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 
 EDGE_SHARE = 0.05

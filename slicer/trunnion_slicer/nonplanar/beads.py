@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from shapely.geometry import MultiPolygon
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.bead import bead_width
 from trunnion_core.layers import Bead, Layer
 from trunnion_core.settings import PrintSettings
-
 from trunnion_slicer.nonplanar.footprint import footprint
 from trunnion_slicer.nonplanar.grid import Grid, build_grid
 from trunnion_slicer.nonplanar.offset import Surfaces

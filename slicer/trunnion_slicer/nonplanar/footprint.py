@@ -3,8 +3,8 @@
 import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon
-from trunnion_core.arrays import FloatArray, IntArray
 
+from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_slicer.nonplanar.grid import Grid
 from trunnion_slicer.walls import as_multipolygon
 

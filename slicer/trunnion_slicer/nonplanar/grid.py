@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from trunnion_core.arrays import FloatArray, IntArray, freeze
 
+from trunnion_core.arrays import FloatArray, IntArray, freeze
 from trunnion_slicer.nonplanar.grid_kernels import bucket, bucket_count, column, cut, locate
 
 MOST_ENTRIES = 60

@@ -7,6 +7,7 @@ box, or a body off the axis, is widened to the smallest solid of revolution abou
 from collections.abc import Sequence
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile_file import BoxTable, ConeTable, CylinderTable, SolidTable
 

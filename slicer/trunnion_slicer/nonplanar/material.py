@@ -7,8 +7,8 @@ rooms, each with the ball that holds it, so that a search passes over what is fa
 from dataclasses import dataclass
 
 import numpy as np
-from trunnion_core.arrays import BoolArray, FloatArray, IntArray, freeze
 
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray, freeze
 from trunnion_slicer.nonplanar.normals import face_normals
 
 CUBE = 2.0

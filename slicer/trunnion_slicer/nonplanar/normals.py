@@ -6,6 +6,7 @@ towards wherever a tessellator happened to put more triangles, so each is weight
 """
 
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 
 LONGEST_STEP = 3.0

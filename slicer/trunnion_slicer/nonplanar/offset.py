@@ -8,8 +8,8 @@ relaxed by moving their triangles as a whole; a surface that stays folded ends t
 from dataclasses import dataclass
 
 import numpy as np
-from trunnion_core.arrays import BoolArray, FloatArray, freeze
 
+from trunnion_core.arrays import BoolArray, FloatArray, freeze
 from trunnion_slicer.nonplanar.patch import Patch
 
 RELAXED_SHARE = 0.1

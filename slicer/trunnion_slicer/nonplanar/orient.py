@@ -6,8 +6,8 @@ are nearly parallel to its own, and along a path that crosses the crease the too
 """
 
 import numpy as np
-from trunnion_core.arrays import FloatArray, IntArray
 
+from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_slicer.nonplanar.normals import corner_angles, face_normals
 from trunnion_slicer.nonplanar.patch import Patch
 

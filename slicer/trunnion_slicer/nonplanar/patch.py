@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray, freeze
 from trunnion_core.mesh import Mesh
-
 from trunnion_slicer.nonplanar.normals import face_normals, mean_normals, offset_steps
 from trunnion_slicer.nonplanar.regions import components
 

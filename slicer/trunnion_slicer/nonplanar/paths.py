@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPolygon
+
 from trunnion_core.arrays import FloatArray, freeze
 from trunnion_core.bead import bead_spacing
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
-
 from trunnion_slicer.infill import fill
 from trunnion_slicer.nonplanar.normals import face_normals
 from trunnion_slicer.nonplanar.offset import Surfaces

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import manifold3d
 import numpy as np
+
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.errors import MeshError
 from trunnion_core.mesh import Mesh
-
 from trunnion_slicer.nonplanar.offset import Surfaces
 
 ROOF = 1.0

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from trunnion_core.arrays import FloatArray, IntArray, freeze
 
+from trunnion_core.arrays import FloatArray, IntArray, freeze
 from trunnion_slicer.nonplanar.grid import Grid
 from trunnion_slicer.nonplanar.orient import spread_jumps
 from trunnion_slicer.nonplanar.thin_kernel import thinned

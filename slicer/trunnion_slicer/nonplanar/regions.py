@@ -10,10 +10,10 @@ a groove) stays planar, and so does what is too small to be worth it.
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.mesh import Mesh
 from trunnion_core.settings import PrintSettings
-
 from trunnion_slicer.nonplanar.grid import build_grid
 from trunnion_slicer.nonplanar.normals import face_normals
 

@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
-from trunnion_core.arrays import FloatArray, IntArray
 
+from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_slicer.nonplanar.project import Lifted
 
 ROUNDS = 60

@@ -1,6 +1,7 @@
 """Marked edges of a mesh become two each, and the faces on both sides are split to match: no gaps, no T-junctions."""
 
 import numpy as np
+
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 
 

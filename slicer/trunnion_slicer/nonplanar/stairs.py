@@ -9,11 +9,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.ndimage import map_coordinates, uniform_filter
+
 from trunnion_core.arrays import FloatArray
 from trunnion_core.bead import bead_spacing, bead_width
 from trunnion_core.layers import Layer
 from trunnion_core.settings import PrintSettings
-
 from trunnion_slicer.nonplanar.grid import Grid, build_grid
 from trunnion_slicer.nonplanar.offset import Surfaces
 from trunnion_slicer.nonplanar.tops import Tops, bead_tops

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+
 from trunnion_core.arrays import FloatArray, freeze
 from trunnion_core.bead import bead_area, bead_width
 from trunnion_core.layers import Layer
