@@ -92,6 +92,9 @@ def _scene(report: Report, profile: MachineProfile, findings: list[dict[str, Any
             "axis": profile.tool_axis.tolist(),
             "body": [solid.model_dump() for solid in profile.tool_bodies],
         },
+        "bodies": [
+            {"solid": body.solid.model_dump(), "joints": _carriers(profile, body.carried_by)} for body in profile.bodies
+        ],
         "origin": profile.origin.tolist(),
         "work": [_plate(profile), *(solid.model_dump() for solid in profile.work_bodies)],
         "roles": [
@@ -118,6 +121,12 @@ def _scene(report: Report, profile: MachineProfile, findings: list[dict[str, Any
             "range": DEVIATION_RANGE,
         }
     return scene
+
+
+def _carriers(profile: MachineProfile, letter: str) -> int:
+    """How many joints of the tool side, from the frame outwards, carry a body: up to the one of that letter."""
+    tool_side = [joint.letter for joint in profile.joints if joint.side == "tool"]
+    return tool_side.index(letter) + 1 if letter in tool_side else 0
 
 
 def _plate(profile: MachineProfile) -> dict[str, Any]:

@@ -40,10 +40,10 @@ function rigidInverse(m) {
 }
 
 // ---- the joint chain: product of exponentials, from the frame outwards on each side
-function side(name, q) {
-  let m = identity();
+function side(name, q, most = Infinity) {
+  let m = identity(), done = 0;
   joints.forEach((joint, i) => {
-    if (joint.side !== name) return;
+    if (joint.side !== name || done++ >= most) return;
     const move = joint.rotary
       ? multiply(multiply(translation(joint.point), rotation(joint.axis, q[i])), translation(joint.point.map((x) => -x)))
       : translation(joint.axis.map((x) => x * q[i]));
@@ -177,6 +177,7 @@ const beads = gl && { shape: buffer(beadVertices()), colour: buffer(beadColours(
 const travels = gl && buffer(Float32Array.from(travelRows.flatMap((i) => Array.from(rows.points.subarray(i * 3 - 3, i * 3 + 3)))));
 const tool = gl && facts.tool.body.map((shape) => { const data = solid(shape); return { data: buffer(data), n: data.length / 6 }; });
 const work = gl && facts.work.map((shape) => { const data = solid(shape); return { data: buffer(data), n: data.length / 6 }; });
+const frame = gl && facts.bodies.map((body) => { const data = solid(body.solid); return { data: buffer(data), n: data.length / 6, joints: body.joints }; });
 const cloud = gl && deviation && { points: buffer(deviation.points), colour: buffer(Float32Array.from(Array.from(deviation.value).flatMap((v) => {
   const t = Math.min(Math.max(v / facts.deviation.range, -1), 1);
   return t > 0 ? [0.95, 0.95 - 0.75 * t, 0.95 - 0.8 * t] : [0.95 + 0.8 * t, 0.95 + 0.6 * t, 0.95];
@@ -236,7 +237,9 @@ function draw() {
   }
   if (byId("machine").checked) {
     gl.enable(gl.BLEND); gl.enable(gl.CULL_FACE); gl.depthMask(false); gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE); attribute(2, null);
-    for (const [bodies, model, colour, alpha] of [[work, partModel, [0.55, 0.57, 0.6], 0.3], [tool, toolModel, [0.75, 0.6, 0.35], 0.45]]) {
+    const toView = inPart ? rigidInverse(machineFromPart) : identity();
+    const carried = frame.map((body) => [[body], multiply(toView, side("tool", q, body.joints)), [0.45, 0.5, 0.55], 0.35]);
+    for (const [bodies, model, colour, alpha] of [...carried, [work, partModel, [0.55, 0.57, 0.6], 0.3], [tool, toolModel, [0.75, 0.6, 0.35], 0.45]]) {
       gl.uniformMatrix4fv(uniforms.model, false, model); gl.uniform1f(uniforms.alpha, alpha); gl.vertexAttrib3f(2, ...colour);
       for (const body of bodies) { attribute(0, body.data, 24, 0); attribute(1, body.data, 24, 12); gl.drawArrays(gl.TRIANGLES, 0, body.n); }
     }
