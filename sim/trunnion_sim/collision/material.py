@@ -4,12 +4,25 @@ A bead raises the cells under it to its upper surface, a stadium's: flat over wi
 """
 
 import math
+from typing import Any
 
 from numba import njit
 
 
 @njit(cache=True)
-def raise_bead(cells, blocks, tiles, corner, cell, block, start, end, axis, width, height):  # type: ignore[no-untyped-def]
+def raise_bead(
+    cells: Any,
+    blocks: Any,
+    tiles: Any,
+    corner: Any,
+    cell: Any,
+    block: Any,
+    start: Any,
+    end: Any,
+    axis: Any,
+    width: Any,
+    height: Any,
+) -> Any:
     """Lay one bead from start to end (tip positions, `part`), as wide and high as told; updates the three grids."""
     ux, uy, uz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     length = math.sqrt(ux * ux + uy * uy + uz * uz)

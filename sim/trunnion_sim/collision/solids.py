@@ -5,6 +5,7 @@ Box: (1, lowest corner, highest corner, 0).
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -42,7 +43,7 @@ def radius_of(row: FloatArray) -> float:
 
 
 @njit(cache=True)
-def signed_distance(row, x, y, z):  # type: ignore[no-untyped-def]
+def signed_distance(row: Any, x: Any, y: Any, z: Any) -> Any:
     """Distance in mm of a point in the body's frame from its surface, negative inside."""
     if row[0] == 1.0:
         dx = abs(x - (row[1] + row[4]) / 2) - (row[4] - row[1]) / 2

@@ -16,6 +16,7 @@ than PRESS above the plane of the tip.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -123,7 +124,7 @@ def sweep(
 
 
 @njit(cache=True)
-def _turn(axis, angle, out):  # type: ignore[no-untyped-def]
+def _turn(axis: Any, angle: Any, out: Any) -> Any:
     """Rodrigues' formula into out (3, 3)."""
     c, s = math.cos(angle), math.sin(angle)
     t = 1.0 - c
@@ -134,7 +135,9 @@ def _turn(axis, angle, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _side(q, work, count, work_side, rotary, axes, pivots, rotation, shift):  # type: ignore[no-untyped-def]
+def _side(
+    q: Any, work: Any, count: Any, work_side: Any, rotary: Any, axes: Any, pivots: Any, rotation: Any, shift: Any
+) -> Any:
     """Motion of one side's first `count` joints at q: point -> rotation @ point + shift, in the machine frame."""
     rotation[:] = 0.0
     rotation[0, 0] = rotation[1, 1] = rotation[2, 2] = 1.0
@@ -168,7 +171,24 @@ def _side(q, work, count, work_side, rotary, axes, pivots, rotation, shift):  # 
 
 
 @njit(cache=True)
-def _place(q, b, work_side, rotary, axes, pivots, origin, turns, places, carried, rw, tw, rt, tt, rotation, shift):  # type: ignore[no-untyped-def]
+def _place(
+    q: Any,
+    b: Any,
+    work_side: Any,
+    rotary: Any,
+    axes: Any,
+    pivots: Any,
+    origin: Any,
+    turns: Any,
+    places: Any,
+    carried: Any,
+    rw: Any,
+    tw: Any,
+    rt: Any,
+    tt: Any,
+    rotation: Any,
+    shift: Any,
+) -> Any:
     """Part from body at q, into rotation (3, 3) and shift (3,)."""
     _side(q, True, len(q), work_side, rotary, axes, pivots, rw, tw)
     _side(q, False, carried[b], work_side, rotary, axes, pivots, rt, tt)
@@ -186,7 +206,7 @@ def _place(q, b, work_side, rotary, axes, pivots, origin, turns, places, carried
 
 
 @njit(cache=True)
-def _lever(q, point, place, work_side, rotary, pivots, origin):  # type: ignore[no-untyped-def]
+def _lever(q: Any, point: Any, place: Any, work_side: Any, rotary: Any, pivots: Any, origin: Any) -> Any:
     """At least the distance in mm of a body's reference point from every rotary axis of its way to the part.
 
     A joint keeps distances to its own axis; from one axis to the next their pivots' distance is added, and what linear
@@ -214,7 +234,7 @@ def _lever(q, point, place, work_side, rotary, pivots, origin):  # type: ignore[
 
 
 @njit(cache=True)
-def _at(row, rotation, shift, x, y, z):  # type: ignore[no-untyped-def]
+def _at(row: Any, rotation: Any, shift: Any, x: Any, y: Any, z: Any) -> Any:
     """Signed distance of a point of the part from a placed body."""
     dx, dy, dz = x - shift[0], y - shift[1], z - shift[2]
     return signed_distance(
@@ -226,7 +246,7 @@ def _at(row, rotation, shift, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _column(row, rotation, shift, x, y, low, high):  # type: ignore[no-untyped-def]
+def _column(row: Any, rotation: Any, shift: Any, x: Any, y: Any, low: Any, high: Any) -> Any:
     """Smallest signed distance of the upright line from low to high; (distance, z).
 
     Distance to a convex body is convex along a line, so the section search (golden, 24 steps) ends at the minimum.
@@ -252,7 +272,22 @@ def _column(row, rotation, shift, x, y, low, high):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True)
-def _nearest(row, middle, radius, rotation, shift, press, lean, cells, blocks, tiles, corner, floor, want, found):  # type: ignore[no-untyped-def]
+def _nearest(
+    row: Any,
+    middle: Any,
+    radius: Any,
+    rotation: Any,
+    shift: Any,
+    press: Any,
+    lean: Any,
+    cells: Any,
+    blocks: Any,
+    tiles: Any,
+    corner: Any,
+    floor: Any,
+    want: Any,
+    found: Any,
+) -> Any:
     """Smallest distance below `want` between a placed body and what stands on the bed; `want` where there is none.
 
     Only material that stands more than press - lean * (distance from the tip) above the tip's plane counts.
@@ -334,33 +369,33 @@ def _nearest(row, middle, radius, rotation, shift, press, lean, cells, blocks, t
 
 
 @njit(cache=True)
-def _sweep(  # type: ignore[no-untyped-def]
-    joints,
-    tips,
-    tool_axes,
-    width,
-    height,
-    checked,
-    work_side,
-    rotary,
-    axes,
-    pivots,
-    origin,
-    bodies,
-    middles,
-    radii,
-    turns,
-    places,
-    carried,
-    nozzle,
-    cells,
-    blocks,
-    tiles,
-    corner,
-    floor,
-    worst,
-    where,
-):
+def _sweep(
+    joints: Any,
+    tips: Any,
+    tool_axes: Any,
+    width: Any,
+    height: Any,
+    checked: Any,
+    work_side: Any,
+    rotary: Any,
+    axes: Any,
+    pivots: Any,
+    origin: Any,
+    bodies: Any,
+    middles: Any,
+    radii: Any,
+    turns: Any,
+    places: Any,
+    carried: Any,
+    nozzle: Any,
+    cells: Any,
+    blocks: Any,
+    tiles: Any,
+    corner: Any,
+    floor: Any,
+    worst: Any,
+    where: Any,
+) -> Any:
     """The loop over rows; intervals of a row wait on a stack. Returns (smallest distance measured, poses looked at)."""
     n, k = joints.shape
     rw, rt, rotation = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -386,8 +421,9 @@ def _sweep(  # type: ignore[no-untyped-def]
                 waiting -= 1
                 begin, end = stack[waiting, 0], stack[waiting, 1]
                 share = end - begin
-                for side in range(2):
-                    at = begin if side == 0 else end
+                middle = (begin + end) / 2.0
+                for look in range(3):
+                    at = begin if look == 0 else (end if look == 1 else middle)
                     for j in range(k):
                         q[j] = joints[i - 1, j] + at * (joints[i, j] - joints[i - 1, j])
                     _place(
@@ -408,30 +444,10 @@ def _sweep(  # type: ignore[no-untyped-def]
                         rotation,
                         shift,
                     )
-                    if side == 0:
+                    if look == 0:
                         first[:] = shift
-                    else:
+                    elif look == 1:
                         last[:] = shift
-                for j in range(k):
-                    q[j] = joints[i - 1, j] + (begin + end) / 2 * (joints[i, j] - joints[i - 1, j])
-                _place(
-                    q,
-                    b,
-                    work_side,
-                    rotary,
-                    axes,
-                    pivots,
-                    origin,
-                    turns,
-                    places,
-                    carried,
-                    rw,
-                    tw,
-                    rt,
-                    tt,
-                    rotation,
-                    shift,
-                )
                 poses += 1
                 dx, dy, dz = last[0] - first[0], last[1] - first[1], last[2] - first[2]
                 chord = math.sqrt(dx * dx + dy * dy + dz * dz)
@@ -445,32 +461,10 @@ def _sweep(  # type: ignore[no-untyped-def]
                     axial = abs(rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz) / 2.0
                     lean = angle / 2.0
                     press = PRESS - axial - bow - chord * angle / 4.0
-                if motion > SMALLEST_STEP / 2.0:
-                    near = _nearest(
-                        bodies[b],
-                        middles[b],
-                        radii[b],
-                        rotation,
-                        shift,
-                        press,
-                        lean,
-                        cells,
-                        blocks,
-                        tiles,
-                        corner,
-                        floor,
-                        motion,
-                        found,
-                    )
-                    if near >= motion:
-                        continue
-                    middle = (begin + end) / 2.0
-                    stack[waiting, 0], stack[waiting, 1] = begin, middle
-                    stack[waiting + 1, 0], stack[waiting + 1, 1] = middle, end
-                    waiting += 2
-                    continue
-                if nozzle[b]:
+                decides = motion <= SMALLEST_STEP / 2.0
+                if decides and nozzle[b]:
                     press, lean = PRESS, 0.0
+                want = SMALLEST_STEP if decides else motion
                 near = _nearest(
                     bodies[b],
                     middles[b],
@@ -484,9 +478,15 @@ def _sweep(  # type: ignore[no-untyped-def]
                     tiles,
                     corner,
                     floor,
-                    SMALLEST_STEP,
+                    want,
                     found,
                 )
+                if not decides:
+                    if near < motion:
+                        stack[waiting, 0], stack[waiting, 1] = begin, middle
+                        stack[waiting + 1, 0], stack[waiting + 1, 1] = middle, end
+                        waiting += 2
+                    continue
                 if near < clearance:
                     clearance = near
                 if near < worst[i, b]:
