@@ -8,11 +8,11 @@ from trunnion import samples
 from trunnion.commands.report import print_findings
 from trunnion.dry_run import check_program
 from trunnion.html_report import report_page
-from trunnion.output import whole_file
 from trunnion.pictures import draw_deviation, draw_joints, draw_toolpath
 from trunnion.pipeline import Timings, load_part, make_job, write_job
 from trunnion.printing import open_printer, print_program
 from trunnion_core.errors import SettingsError, StreamError
+from trunnion_core.output import whole_file
 from trunnion_core.profile import load_profile
 from trunnion_core.settings import PrintSettings
 from trunnion_core.validation import nearest

@@ -3,8 +3,6 @@
 Words are rounded first; the moves, the feed and the carried filament are computed from what the firmware will read.
 """
 
-import os
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +12,7 @@ from typing import TextIO
 import numpy as np
 
 from trunnion_core.errors import GcodeError
+from trunnion_core.output import whole_file
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
 from trunnion_core.settings import PrintSettings
@@ -186,14 +185,5 @@ def _whole(out: Path | TextIO) -> Iterator[TextIO]:
     if not isinstance(out, Path):
         yield out
         return
-    handle, name = tempfile.mkstemp(prefix=f".{out.name}.", suffix=".part", dir=out.parent)
-    part = Path(name)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            yield file
-        mask = os.umask(0)
-        os.umask(mask)
-        part.chmod(0o666 & ~mask)
-        part.replace(out)
-    finally:
-        part.unlink(missing_ok=True)
+    with whole_file(out) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+        yield file

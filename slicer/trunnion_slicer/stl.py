@@ -13,6 +13,7 @@ from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import MeshError
 from trunnion_core.findings import Finding
 from trunnion_core.mesh import Mesh
+from trunnion_core.output import whole_file
 
 HEADER_BYTES = 84
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -41,12 +42,8 @@ def write_stl(mesh: Mesh, path: Path) -> None:
     record["normal"] = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
     record["corners"] = corners
     header = b"Trunnion, millimetres".ljust(80) + len(record).to_bytes(4, "little")
-    unfinished = path.with_name(path.name + ".part")
-    try:
-        unfinished.write_bytes(header + record.tobytes())
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with whole_file(path) as part:
+        part.write_bytes(header + record.tobytes())
 
 
 def _binary(path: Path, data: bytes, promised: int) -> tuple[FloatArray, list[Finding]]:

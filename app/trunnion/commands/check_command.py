@@ -26,8 +26,8 @@ def command(
     """Run PROGRAM in the software machine and judge it. Exit status: 0 pass, 1 findings, 2 misuse."""
     from trunnion.commands.report import print_findings
     from trunnion.dry_run import check_program
-    from trunnion.output import whole_file
     from trunnion.progress import Progress
+    from trunnion_core.output import whole_file
     from trunnion_core.profile import load_profile
 
     profile = load_profile(machine)

@@ -19,7 +19,7 @@ def command(joints: Path, machine: str, output: Path) -> None:
     import numpy as np
 
     from trunnion.arrays_file import read_arrays
-    from trunnion.output import whole_file
+    from trunnion_core.output import whole_file
     from trunnion_core.profile import load_profile
     from trunnion_kinematics.chain import JointChain
 

@@ -25,9 +25,9 @@ def command(
 ) -> None:
     """Slice MODEL (STL, OBJ, PLY or 3MF) for one machine."""
     from trunnion.commands.report import print_findings, print_timings
-    from trunnion.output import whole_file
     from trunnion.pipeline import Timings, load_part, make_job, write_job
     from trunnion.progress import Progress
+    from trunnion_core.output import whole_file
     from trunnion_core.profile import load_profile
     from trunnion_core.settings_file import load_settings
 
