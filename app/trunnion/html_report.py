@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from trunnion.pictures import DEVIATION_RANGE, ROLE_COLOURS
 from trunnion_core.profile import MachineProfile
-from trunnion_core.profile_file import CylinderTable
 from trunnion_core.roles import Role
+from trunnion_core.solid_tables import CylinderTable
 from trunnion_sim.report import Report
 
 PARTS = Path(__file__).parent / "report_page"

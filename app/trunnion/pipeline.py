@@ -21,6 +21,7 @@ from trunnion_core.toolpath import Toolpath
 from trunnion_gcode.write import WriteSummary, write_program
 from trunnion_motion.plan import plan_motion
 from trunnion_slicer.mesh_io import load_mesh
+from trunnion_slicer.nonplanar.head import head_of
 from trunnion_slicer.placement import place
 from trunnion_slicer.repair import make_solid
 from trunnion_slicer.slice import slice_mesh
@@ -91,7 +92,7 @@ def make_job(part: Part, profile: MachineProfile, settings: PrintSettings, timin
     """Slice a part and plan its motion on the machine. Raises UnreachableError, SettingsError or MeshError."""
     timings = timings or Timings()
     settings = settings_for(profile, settings)
-    sliced = slice_mesh(part.mesh, settings, profile.tool_bodies)
+    sliced = slice_mesh(part.mesh, settings, head_of(profile))
     timings.seconds.update(sliced.timings)
     with timings.stage("motion"):
         planned = plan_motion(sliced.toolpath, profile, settings)

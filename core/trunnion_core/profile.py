@@ -14,15 +14,15 @@ from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import ProfileError
 from trunnion_core.profile_file import (
     BedTable,
-    BodyTable,
     ExtruderTable,
     GcodeTable,
     HeatersTable,
     JointTable,
     PlannerTable,
     ProfileFile,
-    SolidTable,
 )
+from trunnion_core.solid_tables import HullTable, MeshTable, SolidEntry, SolidTable
+from trunnion_core.stl_corners import stl_corners
 from trunnion_core.validation import nearest, sentences
 
 
@@ -60,6 +60,18 @@ class Joint:
 
 
 @dataclass(frozen=True, eq=False)
+class Body:
+    """A body that is neither tool nor clamp, for collision."""
+
+    carried_by: str
+    """Letter of a joint of either side, or frame."""
+    solid: SolidTable
+    """mm, machine frame, all joints at zero."""
+    touches: tuple[str, ...]
+    """Names of bodies that it may touch."""
+
+
+@dataclass(frozen=True, eq=False)
 class MachineProfile:
     """A validated machine. `joints` is in profile order: from the frame outwards within each side."""
 
@@ -85,8 +97,8 @@ class MachineProfile:
     heaters: HeatersTable
     planner: PlannerTable
     gcode: GcodeTable
-    bodies: tuple[BodyTable, ...] = ()
-    """Bodies in the machine frame that other joints than the last carry, or the frame."""
+    bodies: tuple[Body, ...] = ()
+    """Bodies that the frame or any joint carries."""
 
     @cached_property
     def letters(self) -> tuple[str, ...]:
@@ -152,6 +164,7 @@ def _read_with_parents(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
         raise ProfileError(str(path), [f"is not TOML: {error}"]) from None
     except OSError as error:
         raise ProfileError(str(path), [f"cannot be read: {error.strerror}"]) from None
+    _find_mesh_files(data, path.parent)
     parent = data.get("extends")
     if not isinstance(parent, str):
         return data
@@ -168,9 +181,26 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     return result
 
 
+def _find_mesh_files(data: dict[str, Any], folder: Path) -> None:
+    """Name the mesh files of a profile's solids from here, not from the profile's `folder`; what is odd stays as is."""
+    tables = [data.get("tool"), data.get("work")]
+    lists = [data.get("body"), *(table.get("body") for table in tables if isinstance(table, dict))]
+    entries = [entry for listed in lists if isinstance(listed, list) for entry in listed if isinstance(entry, dict)]
+    for entry in entries:
+        solid = entry.get("solid", entry)
+        if isinstance(solid, dict) and isinstance(solid.get("file"), str):
+            solid["file"] = str(folder / solid["file"])
+
+
 def profile_from_file(file: ProfileFile, source: str) -> MachineProfile:
-    """Convert a validated file to internal units."""
+    """Convert a validated file to internal units, with every mesh file read. ProfileError where one cannot be."""
     flat = file.tool.nozzle_flat_diameter
+    problems: list[str] = []
+    tool_bodies = tuple(_solid(entry, problems) for entry in file.tool.body)
+    work_bodies = tuple(_solid(entry, problems) for entry in file.work.body)
+    bodies = tuple(Body(body.carried_by, _solid(body.solid, problems), body.touches) for body in file.body)
+    if problems:
+        raise ProfileError(source, problems)
     return MachineProfile(
         file=source,
         name=file.machine.name,
@@ -182,16 +212,33 @@ def profile_from_file(file: ProfileFile, source: str) -> MachineProfile:
         nozzle_diameter=file.tool.nozzle_diameter,
         nozzle_flat_diameter=2 * file.tool.nozzle_diameter if flat is None else flat,
         filament_diameter=file.tool.filament_diameter,
-        tool_bodies=file.tool.body,
+        tool_bodies=tool_bodies,
         origin=np.array(file.work.origin, dtype=np.float64),
         bed=file.work.bed,
-        work_bodies=file.work.body,
+        work_bodies=work_bodies,
         extruder=file.extruder,
         heaters=file.heaters,
         planner=file.planner,
         gcode=file.gcode,
-        bodies=file.body,
+        bodies=bodies,
     )
+
+
+def _solid(entry: SolidEntry, problems: list[str]) -> SolidTable:
+    """The solid itself; a mesh file becomes the hull of its corners, or one of the problems and a hull of nothing."""
+    if not isinstance(entry, MeshTable):
+        return entry
+    try:
+        return HullTable(
+            shape="hull", name=entry.name, points=tuple(map(tuple, stl_corners(Path(entry.file)).tolist()))
+        )
+    except OSError as error:
+        problems.append(f"body {entry.name}: {entry.file} cannot be read: {error.strerror}")
+    except ValidationError:
+        problems.append(f"body {entry.name}: the corners of {entry.file} lie in one plane, should bound a volume")
+    except ValueError as error:
+        problems.append(f"body {entry.name}: {entry.file} {error}")
+    return HullTable.model_construct(shape="hull", name=entry.name, points=())
 
 
 def _joint(table: JointTable) -> Joint:

@@ -3,24 +3,23 @@
 This one model validates profiles, and its JSON schema and reference page are made from it.
 """
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from trunnion_core.solid_tables import BodyTable, Point2, SolidEntry, Table, Vector
 from trunnion_core.tolerance import PARALLEL_AXES
+from trunnion_core.validation import nearest
 
-Vector = tuple[float, float, float]
-Point2 = tuple[float, float]
 RESERVED_LETTERS = set("EFGMNST")
 """Letters that G-code uses for something else than an axis."""
+BED = "bed"
+"""What findings, and `touches`, call the plate that the part stands on."""
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class JointTable(_Table):
+class JointTable(Table):
     """One joint. A growing value moves the carried body along +axis, or turns it right-handed about axis."""
 
     letter: str = Field(pattern="^[A-Z]$", description="Name of the axis in G-code.")
@@ -73,49 +72,7 @@ class JointTable(_Table):
         return self
 
 
-class ConeTable(_Table):
-    """A cone or truncated cone along the local Z."""
-
-    shape: Literal["cone"]
-    name: str = Field(description="What findings call it.")
-    bottom: float = Field(description="Z of the lower end, mm.")
-    top: float = Field(description="Z of the upper end, mm.")
-    bottom_diameter: float = Field(ge=0, description="mm.")
-    top_diameter: float = Field(ge=0, description="mm.")
-    center: Point2 = Field((0.0, 0.0), description="X and Y of the axis, mm.")
-
-
-class CylinderTable(_Table):
-    """A cylinder along the local Z."""
-
-    shape: Literal["cylinder"]
-    name: str = Field(description="What findings call it.")
-    bottom: float = Field(description="Z of the lower end, mm.")
-    top: float = Field(description="Z of the upper end, mm.")
-    diameter: float = Field(gt=0, description="mm.")
-    center: Point2 = Field((0.0, 0.0), description="X and Y of the axis, mm.")
-
-
-class BoxTable(_Table):
-    """A box along the local axes."""
-
-    shape: Literal["box"]
-    name: str = Field(description="What findings call it.")
-    min: Vector = Field(description="Lowest corner, mm.")
-    max: Vector = Field(description="Highest corner, mm.")
-
-
-SolidTable = Annotated[ConeTable | CylinderTable | BoxTable, Field(discriminator="shape")]
-
-
-class BodyTable(_Table):
-    """A body of the machine that is neither tool nor table, such as a gantry's beam, for collision with the part."""
-
-    carried_by: str = Field(description="Letter of the tool-side joint that carries it, or frame.")
-    solid: SolidTable = Field(description="Convex solid: mm, machine frame, all joints at zero.")
-
-
-class ToolTable(_Table):
+class ToolTable(Table):
     """The nozzle. Bodies stand in the tool frame: origin at the tip, Z along the tool axis."""
 
     tip: Vector = Field((0.0, 0.0, 0.0), description="Tip of the nozzle: mm, machine frame, all joints at zero.")
@@ -125,10 +82,10 @@ class ToolTable(_Table):
         None, gt=0, description="Outer diameter of the flat around the bore, mm; by default twice the bore."
     )
     filament_diameter: float = Field(1.75, gt=0, le=4, description="mm.")
-    body: tuple[SolidTable, ...] = Field((), description="Convex solids for collision, tool frame.")
+    body: tuple[SolidEntry, ...] = Field((), description="Convex solids for collision, tool frame.")
 
 
-class BedTable(_Table):
+class BedTable(Table):
     """The printable area, in the part frame of a part placed at the origin."""
 
     shape: Literal["rectangle", "circle"]
@@ -150,15 +107,15 @@ class BedTable(_Table):
         return self
 
 
-class WorkTable(_Table):
+class WorkTable(Table):
     """Where the part stands."""
 
     origin: Vector = Field((0.0, 0.0, 0.0), description="The part's origin: mm, machine frame, all joints at zero.")
     bed: BedTable
-    body: tuple[SolidTable, ...] = Field((), description="Clamps and the like that move with the part, part frame.")
+    body: tuple[SolidEntry, ...] = Field((), description="Clamps and the like that move with the part, part frame.")
 
 
-class ExtruderTable(_Table):
+class ExtruderTable(Table):
     """The filament drive and what the hot end can melt."""
 
     speed: float = Field(50.0, gt=0, description="Fastest filament, mm/s.")
@@ -173,20 +130,20 @@ class ExtruderTable(_Table):
     )
 
 
-class HeaterTable(_Table):
+class HeaterTable(Table):
     """A heater's limits."""
 
     max_temperature: float = Field(gt=0, description="°C.")
 
 
-class HeatersTable(_Table):
+class HeatersTable(Table):
     """The heaters that the machine has."""
 
     nozzle: HeaterTable = HeaterTable(max_temperature=285)
     bed: HeaterTable | None = HeaterTable(max_temperature=110)
 
 
-class PlannerTable(_Table):
+class PlannerTable(Table):
     """How the firmware plans, beyond the joints' own limits."""
 
     junction_deviation: float | None = Field(
@@ -202,7 +159,7 @@ class PlannerTable(_Table):
     baud: int = Field(250000, gt=0, description="Speed of the serial port.")
 
 
-class GcodeTable(_Table):
+class GcodeTable(Table):
     """Code around the print. `{temperature}`, `{bed_temperature}` and `{park}` are filled in; nothing is evaluated."""
 
     start: tuple[str, ...] = Field(("G28",), description="Lines before heating is waited for: homing and the like.")
@@ -212,7 +169,7 @@ class GcodeTable(_Table):
     decimals_extruder: int = Field(5, ge=3, le=6, description="Decimals of E words.")
 
 
-class MachineTable(_Table):
+class MachineTable(Table):
     """What the machine is called and what drives it."""
 
     name: str = Field(min_length=1, description="For people.")
@@ -221,7 +178,7 @@ class MachineTable(_Table):
     assumed: tuple[str, ...] = Field((), description="Keys whose numbers are assumptions, not measured or published.")
 
 
-class ProfileFile(_Table):
+class ProfileFile(Table):
     """A whole machine profile."""
 
     extends: str | None = Field(
@@ -231,7 +188,7 @@ class ProfileFile(_Table):
     joint: tuple[JointTable, ...] = Field(description="In order from the frame outwards, within each side.")
     tool: ToolTable = ToolTable()
     work: WorkTable
-    body: tuple[BodyTable, ...] = Field((), description="Bodies that other joints than the last carry, or the frame.")
+    body: tuple[BodyTable, ...] = Field((), description="Bodies that the frame or any joint carries.")
     extruder: ExtruderTable = ExtruderTable()
     heaters: HeatersTable = HeatersTable()
     planner: PlannerTable = PlannerTable()
@@ -244,14 +201,21 @@ class ProfileFile(_Table):
             raise ValueError("; ".join(problems))
         if not np.linalg.norm(self.tool.axis) > 0:
             raise ValueError("tool.axis: is zero, should be a direction")
-        carriers = ["frame", *(joint.letter for joint in self.joint if joint.side == "tool")]
-        for body in self.body:
-            if body.carried_by not in carriers:
-                raise ValueError(
-                    f"body {body.solid.name}: carried_by is {body.carried_by}, should be one of {', '.join(carriers)}; "
-                    "what moves with the part belongs to work.body"
-                )
+        bodies = list(_body_problems(self))
+        if bodies:
+            raise ValueError("; ".join(bodies))
         return self
+
+
+def _body_problems(file: ProfileFile) -> Iterator[str]:
+    carriers = ["frame", *(joint.letter for joint in file.joint)]
+    names = [BED, *(solid.name for solid in (*file.tool.body, *file.work.body, *(body.solid for body in file.body)))]
+    for body in file.body:
+        if body.carried_by not in carriers:
+            yield (f"body {body.solid.name}: carried_by is {body.carried_by}, should be one of {', '.join(carriers)}")
+        for name in body.touches:
+            if name not in names:
+                yield f"body {body.solid.name}: touches {name}, which is no body; {nearest(name, names)}"
 
 
 def _chain_problems(joints: tuple[JointTable, ...]) -> list[str]:

@@ -20,3 +20,6 @@ FLAT_HOLE = 1e-2
 
 PLACEMENT_SLACK = 1e-3
 """mm. How far a part may stick out of the printable space: a part as large as the bed survives a change of units."""
+
+FLAT_BODY = 1e-6
+"""mm. Corners of a body that spread less than this beyond a plane bound no volume."""

@@ -7,8 +7,8 @@ from time import perf_counter
 from trunnion_core.findings import Finding
 from trunnion_core.layers import LayerStack
 from trunnion_core.mesh import Mesh
-from trunnion_core.profile_file import SolidTable
 from trunnion_core.settings import PrintSettings
+from trunnion_core.solid_tables import SolidTable
 from trunnion_core.toolpath import Toolpath
 from trunnion_slicer.assemble import to_toolpath
 from trunnion_slicer.nonplanar.plan import plan_nonplanar

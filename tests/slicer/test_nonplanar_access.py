@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from trunnion_core.mesh import Mesh
-from trunnion_core.profile_file import BoxTable, ConeTable, CylinderTable
+from trunnion_core.solid_tables import BoxTable, ConeTable, CylinderTable
 from trunnion_core.settings import PrintSettings
 from trunnion_slicer.nonplanar import access
 from trunnion_slicer.nonplanar.access import footprints_of, reachable

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
-from trunnion_core.profile_file import BoxTable
+from trunnion_core.solid_tables import BoxTable
 from trunnion_sim.collision.solids import middle_of, radius_of, row_of
 
 CELL = 0.25

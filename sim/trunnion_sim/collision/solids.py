@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from trunnion_core.arrays import FloatArray
-from trunnion_core.profile_file import BoxTable, ConeTable, CylinderTable
+from trunnion_core.solid_tables import BoxTable, ConeTable, CylinderTable
 
 REVOLUTION = 0.0
 BOX = 1.0

@@ -17,8 +17,8 @@ from scipy.spatial import cKDTree
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray, check_array
 from trunnion_core.findings import Finding
 from trunnion_core.mesh import Mesh
-from trunnion_core.profile_file import SolidTable
 from trunnion_core.settings import PrintSettings
+from trunnion_core.solid_tables import SolidTable
 from trunnion_slicer.nonplanar.head import frusta
 from trunnion_slicer.nonplanar.material import Material, material, spread_points
 from trunnion_slicer.nonplanar.normals import face_normals

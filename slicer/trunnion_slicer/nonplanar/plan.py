@@ -17,8 +17,8 @@ from trunnion_core.arrays import BoolArray, FloatArray, check_array, freeze
 from trunnion_core.findings import Finding
 from trunnion_core.layers import Layer
 from trunnion_core.mesh import Mesh
-from trunnion_core.profile_file import SolidTable
 from trunnion_core.settings import PrintSettings
+from trunnion_core.solid_tables import SolidTable
 from trunnion_slicer.planar import Collar, PlanarPlan, plan_planar
 from trunnion_slicer.walls import as_multipolygon
 
