@@ -4,8 +4,10 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.findings import Finding, Severity
@@ -201,7 +203,7 @@ class Context:
         mask: BoolArray,
         message: Callable[[int], str],
         *,
-        value: FloatArray | None = None,
+        value: NDArray[np.floating[Any]] | None = None,
         limit: FloatArray | float | None = None,
         joint: Joint | None = None,
         together: bool = False,

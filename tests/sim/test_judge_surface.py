@@ -109,6 +109,18 @@ def test_a_flat_plate_has_the_groove_floor_of_round_beads(cell: float) -> None:
     assert np.nanmedian(deposit.gap) == pytest.approx(H, abs=5e-4)
 
 
+@pytest.mark.parametrize("length", [1, 7, 100])
+def test_stretches_one_after_the_other_are_the_same_as_all_at_once(length: int) -> None:
+    plates = together(*(layer(12, 0.0, (k + 1) * H, 0.1 + 0.05 * k) for k in range(3)))
+    low, high = np.array([-2.0, -2.0]), np.array([LENGTH + 2.0, ACROSS + 2.0])
+    whole = laid(plates, 0.05)
+    stretches = (plates.cut(at, at + length) for at in range(0, len(plates.row), length))
+    apart = lay_down(stretches, len(plates.row), low, high, 0.05, FLAT, BORE)
+    np.testing.assert_array_equal(apart.field.top, whole.field.top)
+    for name in ("gap", "laid", "unsupported", "crowded", "bulged", "depth", "depth_point", "taken"):
+        np.testing.assert_array_equal(getattr(apart, name), getattr(whole, name))
+
+
 @pytest.mark.parametrize("pitch", [0.36, 0.39])
 def test_wider_pitch_leaves_deeper_grooves_as_predicted(pitch: float) -> None:
     deposit = laid(layer(25, 0.0, H, 0.1, pitch=pitch), 0.025)

@@ -1,8 +1,10 @@
 """Beads lie on something and in a place of their own, and travels go around what is printed."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.findings import Finding
@@ -15,6 +17,8 @@ CODES = {
     "crowded-bead": ("warning", "A bead has less than half the room that it was meant for."),
     "travel-through-print": ("error", "The tip travels through what is printed."),
 }
+
+Floats = NDArray[np.floating[Any]]
 
 SHORTEST = 2.0
 """mm of bead that is worth a finding."""
@@ -83,11 +87,11 @@ def check(context: Context) -> Iterator[Finding]:
     )
 
 
-def _sum(group: IntArray, values: FloatArray) -> FloatArray:
+def _sum(group: IntArray, values: Floats) -> FloatArray:
     return np.asarray(np.bincount(group, weights=values), dtype=np.float64)
 
 
-def _run_length(mask: BoolArray, length: FloatArray) -> FloatArray:
+def _run_length(mask: BoolArray, length: Floats) -> FloatArray:
     """(n,) summed `length` of the run of true rows that each true row belongs to; 0 elsewhere."""
     run: IntArray = np.cumsum(np.diff(mask, prepend=False), dtype=np.int64)
     return np.where(mask, _sum(run, length)[run] if len(run) else 0.0, 0.0)

@@ -30,8 +30,9 @@ volume is kept); what a nozzle not at right angles to its path wipes away; surfa
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, fields
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,10 @@ from trunnion_sim.surface import deposit_kernel
 
 MOST_CELLS = 24_000_000
 """Cells of the height field; beyond that it is made coarser."""
+NEIGHBOURS = 500
+"""Pieces of the stretch before and after that the bore may reach over."""
 
+Floats = NDArray[np.float32]
 
 Ground = Callable[[FloatArray, FloatArray], FloatArray]
 """Heights in mm over X and Y."""
@@ -70,6 +74,10 @@ class Pieces:
             check_array(name, getattr(self, name), (m, 3))
         check_array("volume", self.volume, (m,))
 
+    def cut(self, begin: int, end: int) -> "Pieces":
+        """The pieces from `begin` to `end`."""
+        return Pieces(*(getattr(self, field.name)[begin:end] for field in fields(self)))
+
 
 @dataclass(frozen=True, eq=False)
 class Field:
@@ -89,26 +97,26 @@ class Deposit:
     """What every row met when it was executed, and what is there in the end. (n,) per row of the program."""
 
     field: Field
-    gap: FloatArray
+    gap: Floats
     """mm under the bead, where no neighbour reaches in, mean along the row; NaN where no bead was laid in the field."""
-    laid: FloatArray
+    laid: Floats
     """mm of bead laid inside the field."""
-    unsupported: FloatArray
+    unsupported: Floats
     """mm of it with nothing below within reach and no neighbour beside."""
-    crowded: FloatArray
+    crowded: Floats
     """mm³ that found other plastic in its place and had to go elsewhere."""
-    bulged: FloatArray
+    bulged: Floats
     """mm³ of that which found no room at all and stands above the nozzle's height."""
-    depth: FloatArray
+    depth: Floats
     """mm that the tip dips below the surface of what is printed, at worst, on a travel."""
-    depth_point: FloatArray
+    depth_point: Floats
     """(n, 3) mm: where."""
-    taken: FloatArray
+    taken: Floats
     """Share of the bead's place, across and along, that other plastic holds up to the nozzle."""
 
 
 def lay_down(
-    pieces: Pieces,
+    pieces: Pieces | Iterable[Pieces],
     rows: int,
     low: FloatArray,
     high: FloatArray,
@@ -119,9 +127,10 @@ def lay_down(
 ) -> Deposit:
     """Execute the pieces over the rectangle `low` to `high` (mm, X and Y) with cells of `cell` mm.
 
-    The nozzle's end is flat over `flat_diameter` mm, with a bore of `bore_diameter`. `ground` gives what stands there
-    before the first bead; by default the bed at 0. Cells grow where the rectangle would need more than MOST_CELLS.
-    About 300,000 steps of 2 cells a second.
+    Pieces may come in stretches, one after the other, so that they need not be in memory all at once; no row goes on
+    from one stretch into the next. The nozzle's end is flat over `flat_diameter` mm, with a bore of `bore_diameter`.
+    `ground` gives what stands there before the first bead; by default the bed at 0. Cells grow where the rectangle
+    would need more than MOST_CELLS. About 300,000 steps of 2 cells a second.
     """
     size = np.maximum(high - low, cell)
     cell = max(cell, math.sqrt(float(size[0] * size[1]) / MOST_CELLS))
@@ -129,33 +138,74 @@ def lay_down(
     top = np.zeros((ny, nx), np.float32)
     if ground is not None:
         top += ground(low[0] + cell * np.arange(nx)[None, :], low[1] + cell * np.arange(ny)[:, None]).astype(np.float32)
-    stats = np.zeros((rows, 7))
-    depth_point = np.full((rows, 3), np.nan)
-    deposit_kernel.run(
-        top,
-        float(low[0]),
-        float(low[1]),
-        cell,
-        pieces.row,
-        pieces.start,
-        pieces.end,
-        pieces.tool_axes,
-        pieces.volume,
-        pieces.present,
-        flat_diameter / 2,
-        bore_diameter,
-        stats,
-        depth_point,
-    )
-    laid = stats[:, 1]
+    before, pores, bulge = (np.zeros((ny, nx), np.float32) for _ in range(3))
+    stamp = np.full((ny, nx), -1e30)
+    memory = np.append(np.zeros(4), np.full(3, np.nan))
+    kept = np.zeros((7, rows), np.float32)
+    kept[0] = np.nan
+    depth_point = np.full((rows, 3), np.nan, np.float32)
+    for stretch, begin, end in _with_neighbours([pieces] if isinstance(pieces, Pieces) else pieces):
+        first, last = int(stretch.row[begin]), int(stretch.row[end - 1]) + 1
+        stats, place = np.zeros((last - first, 7)), np.full((last - first, 3), np.nan)
+        deposit_kernel.run(
+            top,
+            float(low[0]),
+            float(low[1]),
+            cell,
+            stretch.row - first,
+            stretch.start,
+            stretch.end,
+            stretch.tool_axes,
+            stretch.volume,
+            stretch.present,
+            flat_diameter / 2,
+            bore_diameter,
+            stats,
+            place,
+            begin,
+            end,
+            before,
+            stamp,
+            pores,
+            bulge,
+            memory,
+        )
+        laid = stats[:, 1]
+        stats[:, 0] = np.divide(stats[:, 0], laid, out=np.full(len(laid), np.nan), where=laid > 0)
+        stats[:, 6] = np.divide(stats[:, 6], laid, out=np.zeros(len(laid)), where=laid > 0)
+        kept[:, first:last] = stats.T
+        depth_point[first:last] = place
+    gap, laid_length, unsupported, crowded, bulged, depth, taken = kept
     return Deposit(
         field=Field(float(low[0]), float(low[1]), cell, top),
-        gap=np.divide(stats[:, 0], laid, out=np.full(rows, np.nan), where=laid > 0),
-        laid=laid,
-        unsupported=stats[:, 2],
-        crowded=stats[:, 3],
-        bulged=stats[:, 4],
-        depth=stats[:, 5],
+        gap=gap,
+        laid=laid_length,
+        unsupported=unsupported,
+        crowded=crowded,
+        bulged=bulged,
+        depth=depth,
         depth_point=depth_point,
-        taken=np.divide(stats[:, 6], laid, out=np.zeros(rows), where=laid > 0),
+        taken=taken,
     )
+
+
+def _with_neighbours(stretches: Iterable[Pieces]) -> Iterator[tuple[Pieces, int, int]]:
+    """Each stretch between the last pieces of the one before and the first of the one after; and where it lies."""
+    before: Pieces | None = None
+    for here, after in pairwise(_then_none(stretch for stretch in stretches if len(stretch.row))):
+        if here is None:
+            break
+        around = [part for part in (before, here, None if after is None else after.cut(0, NEIGHBOURS)) if part]
+        begin = 0 if before is None else len(before.row)
+        yield (joined(around) if len(around) > 1 else here), begin, begin + len(here.row)
+        before = here.cut(max(0, len(here.row) - NEIGHBOURS), len(here.row))
+
+
+def _then_none(stretches: Iterable[Pieces]) -> Iterator[Pieces | None]:
+    yield from stretches
+    yield None
+
+
+def joined(parts: list[Pieces]) -> Pieces:
+    """Pieces after each other."""
+    return Pieces(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Pieces)))

@@ -46,23 +46,28 @@ def run(
     bore: float,
     stats: _F,
     depth_point: _F,
+    begin: int,
+    end: int,
+    before: _G,
+    stamp: _F,
+    pores: _G,
+    bulge: _G,
+    memory: _F,
 ) -> None:
-    """Execute every piece.
+    """Execute the pieces `begin` to `end`; those around them are what the bore reaches over.
 
     Fills top, depth_point, and of stats: gap x length, length, unsupported, crowded, bulged, depth, taken x length.
+    before, stamp, pores, bulge and memory (7,) are what one call hands on to the next: memory is the way of the tip,
+    the direction of the last bead and where it ended.
     """
     ny, nx = top.shape
-    before = np.zeros((ny, nx), np.float32)
-    stamp = np.full((ny, nx), -1e30)
-    pores = np.zeros((ny, nx), np.float32)
-    bulge = np.zeros((ny, nx), np.float32)
-    way = 0.0
-    last_t = np.zeros(3)
-    last_end = np.full(3, np.nan)
+    way = memory[0]
+    last_t = memory[1:4]
+    last_end = memory[4:7]
     result = np.zeros(9)
     spots = np.zeros((max(1, round(bore / (2 * cell))), 7))
     x1, y1 = x0 + (nx - 1) * cell, y0 + (ny - 1) * cell
-    for m in range(len(rows)):
+    for m in range(begin, end):
         if not present[m]:
             last_end[:] = np.nan
             continue
@@ -122,6 +127,7 @@ def run(
         way += length
         last_t[:] = t
         last_end[:] = q
+    memory[0] = way
 
 
 @njit(cache=True)
