@@ -42,7 +42,7 @@ def run_demo(part: str, machine: str, folder: Path, say: Callable[[str], None]) 
         report = check_program(program, profile, model)
     say(f"printing {program} on the embedded machine")
     with timings.stage("print"), open_printer("sim", profile) as printer:
-        result = print_program(program, printer)
+        result = print_program(program, printer, profile)
     if result.reason:
         raise StreamError(f"{program}: stopped after {result.executed} lines: {result.reason}")
     say("drawing")

@@ -1,5 +1,6 @@
 """Printing from the command line: a port by name, the embedded machine among them, and one program through it."""
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -32,17 +33,26 @@ def open_printer(port: str, profile: MachineProfile, baud: int | None = None) ->
 def print_program(
     program: Path,
     printer: Port,
+    profile: MachineProfile,
     *,
     progress: Callable[[float, str], None] | None = None,
+    on_warning: Callable[[str], None] | None = None,
     stop: threading.Event | None = None,
 ) -> StreamResult:
     """Stream a program; returns when the motion is over or the print stopped, with the reason.
 
-    `progress` is told the executed share and a note. Setting `stop` ends the print cleanly.
+    `progress` is told the executed share and a note, `on_warning` what is wrong and no reason to stop: the
+    printer (a Marlin) has other steps per unit than the profile, or left filament out. Setting `stop` ends the
+    print cleanly.
     """
     show = progress or (lambda _share, _note: None)
 
     def told(state: Progress) -> None:
         show(state.executed / max(state.total, 1), f"line {state.executed} of {state.total}")
 
-    return stream_file(program, printer, on_progress=told, stop=stop)
+    steps = {
+        joint.letter: joint.steps_per_unit / joint.shown(1.0)
+        for joint in profile.joints
+        if profile.firmware.startswith("marlin") and math.isfinite(joint.steps_per_unit)
+    }
+    return stream_file(program, printer, on_progress=told, on_warning=on_warning, stop=stop, steps=steps)

@@ -31,12 +31,22 @@ class Progress:
         sys.stderr.flush()
         self._wide = len(line)
 
+    def warn(self, text: str) -> None:
+        """A line that stays, terminal or not."""
+        self._wipe()
+        sys.stderr.write(f"warning: {text}\n")
+        sys.stderr.flush()
+
     def __enter__(self) -> "Progress":
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._wipe()
+
+    def _wipe(self) -> None:
         if self._wide:
             sys.stderr.write("\r" + " " * self._wide + "\r")
             sys.stderr.flush()
+            self._wide = 0

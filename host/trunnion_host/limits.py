@@ -32,6 +32,8 @@ class Limits:
     """For the printer to confirm that it stopped."""
     poll: float = 2.0
     """Between questions for the temperatures."""
+    where: float = 10.0
+    """Between questions for the position. Old firmware waits for all motion to end before it answers."""
     resends: int = 12
     """Of the same line, before giving up."""
     crowded: int = 100

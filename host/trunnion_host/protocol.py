@@ -4,28 +4,29 @@ Every line carries a number and a checksum, and the firmware takes a line only a
 so what is executed is exact whatever happens to the oks. Oks only say when there is room. Nothing is ever sent again
 on suspicion: a stream that stands still *asks*, with an M105 under a fresh number, which the firmware either takes
 (then it had everything) or answers with the number that it misses. The answer to M105 is the only ok with temperatures
-in it, so it also says how many oks went missing or came twice.
+in it, so it also says how many oks went missing or came twice. Now and then, and at the end, it asks where the printer
+stands: firmware drops a move that it cannot reach with an ok like any other.
 """
 
-from array import array
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from trunnion_host.inspection import Inspection, Question
 from trunnion_host.limits import Limits
-from trunnion_host.replies import Kind, Reply, parse, temperatures
+from trunnion_host.line_log import LineLog
+from trunnion_host.replies import Kind, Reader, Reply, temperatures
 from trunnion_host.states import LEGAL, State
+from trunnion_host.window import Window
 from trunnion_host.wire import numbered
 
 ASK = -1
 """In the log: an M105 that the host put between the program's lines."""
-QUESTION = "M105"
-FINISH = "M400"
-"""Waits until everything before it has moved."""
+QUESTIONS = {Question.WHERE: -2, Question.STEPS: -3}
+"""In the log: what the host asks the printer about itself."""
+OWN = ("M105", Question.WHERE.value, Question.STEPS.value)
 HEATERS_OFF = ("M104 S0", "M140 S0", "M107")
 FAREWELL = ("M410", *HEATERS_OFF, "G91", "G1 Z5 F600", "G90")
 """Stop where it is, heaters off, away from the part."""
-LONGEST_REPLY = 4096
-"""Bytes without a newline beyond this are noise."""
 
 
 class Sender:
@@ -33,10 +34,17 @@ class Sender:
 
     `executed` counts the program's lines that the firmware took; when the state is DONE it is all of them, and the
     motion is over. `heaters` holds the last report: letter to (actual, target) °C; `talk` what the firmware last said
-    to people.
+    to people; `warnings` what is wrong and no reason to stop. `steps`, a letter to the motor steps per mm or degree
+    that the profile has, is asked about first; leave it out for firmware that has no M503.
     """
 
-    def __init__(self, lines: Sequence[str], limits: Limits | None = None, farewell: Sequence[str] = FAREWELL) -> None:
+    def __init__(
+        self,
+        lines: Sequence[str],
+        limits: Limits | None = None,
+        farewell: Sequence[str] = FAREWELL,
+        steps: Mapping[str, float] | None = None,
+    ) -> None:
         self.limits = limits or Limits()
         self.state = State.GREETING
         self.reason = ""
@@ -46,17 +54,12 @@ class Sender:
         self.questions = 0
         self.executed = 0
         self.paused = False
-        self.window_lines = self.limits.window_lines
-        self._total = len(lines)
-        self._program = (*lines, FINISH, *farewell)
-        self._end_of_feed = self._total + 1
-        self._log = array("q", [ASK, ASK])  # from number to index in the program; 0 is M110, 1 the greeting's M105
-        self._next_line = 0
+        self._log = LineLog(lines, farewell, OWN)
+        self._inspection = Inspection(steps)
         self._next_number = 1
         self._acked = 0
         self._last_needed = -1
-        self._in_flight: deque[tuple[int, int]] = deque()
-        self._bytes_in_flight = 0
+        self._in_flight = Window(self.limits)
         self._slow = True
         self._asks: deque[int] = deque()
         self._owed: deque[int] = deque()
@@ -65,24 +68,27 @@ class Sender:
         self._verified = 0
         self._answered_plainly = 0
         self._unanswered_asks = 0
-        self._again = (0, 0)
         self._doubted = (0, 0)
-        self._recent_resends: deque[int] = deque(maxlen=5)
-        self._buffer = bytearray()
+        self._reader = Reader()
         self._out = bytearray()
         self._numbers_agreed = False
         self._line_refused = False
-        self._now = self._since = self._heard = self._alive = self._moved = self._asked_at = 0.0
+        self._now = self._since = self._heard = self._alive = self._moved = self._asked_at = self._where_at = 0.0
 
     @property
     def total(self) -> int:
         """Lines of the program."""
-        return self._total
+        return self._log.total
 
     @property
     def sent(self) -> int:
         """Lines of the program that went out at least once."""
-        return min(self._next_line, self._total)
+        return min(self._log.next_line, self._log.total)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is wrong with the printer and no reason to stop, in the order in which it was noticed."""
+        return tuple(self._inspection.warnings)
 
     @property
     def greeted(self) -> bool:
@@ -101,7 +107,7 @@ class Sender:
 
     def start(self, now: float) -> bytes:
         """Begin to agree on numbers."""
-        self._now = self._since = self._heard = self._alive = self._moved = now
+        self._now = self._since = self._heard = self._alive = self._moved = self._where_at = now
         self._greet()
         return self._taken()
 
@@ -110,13 +116,10 @@ class Sender:
         self._pass_time(now)
         if data:
             self._heard = now
-        self._buffer += data
-        *lines, rest = self._buffer.split(b"\n")
-        self._buffer = rest if len(rest) < LONGEST_REPLY else bytearray()
-        for line in lines:
+        for reply in self._reader.take(data):
             if self.over:
                 break
-            self._reply(parse(bytes(line.rstrip(b"\r"))))
+            self._reply(reply)
         self._feed()
         return self._taken()
 
@@ -148,6 +151,8 @@ class Sender:
             self._moved = self._now
         elif kind is Kind.REPORT:
             self.heaters.update(temperatures(reply.text))
+        elif kind is Kind.POSITION:
+            self._stands(reply.text)
         elif kind is Kind.START:
             self._restarted("it sent its start banner")
         elif kind is Kind.FATAL:
@@ -160,6 +165,14 @@ class Sender:
             self._want_ask |= self.state is State.STREAMING  # it may have been an ok
         elif reply.text:
             self.talk.append(reply.text)
+            self._inspection.hear(reply.text)
+
+    def _stands(self, text: str) -> None:
+        """A position was reported; a printer that pauses goes where it likes."""
+        if not self.paused:
+            self._inspection.hear_position(text)
+            if self._inspection.reason:
+                self._abandon(self._inspection.reason)
 
     def _ok(self, reply: Reply) -> None:
         self._moved = self._now
@@ -207,8 +220,7 @@ class Sender:
         if not self._in_flight:
             self._want_ask = True
             return
-        number, size = self._in_flight.popleft()
-        self._bytes_in_flight -= size
+        number = self._in_flight.pop()
         if self._asks and number >= self._asks[0]:
             self._plain_answer(number)
         if self._acked < number < self._next_number:
@@ -226,22 +238,15 @@ class Sender:
     def _believe(self, number: int) -> None:
         """The firmware has taken everything up to `number`; what was sent after that is still under way."""
         self._next_number = max(self._next_number, number + 1)
-        self._in_flight = deque((n, len(self._wire(n))) for n in range(number + 1, self._next_number))
-        self._bytes_in_flight = sum(size for _, size in self._in_flight)
+        self._in_flight.restart((n, len(self._log.wire(n))) for n in range(number + 1, self._next_number))
         self._take(number)
 
     def _take(self, number: int) -> None:
         """Everything up to `number` counts as executed."""
-        if number > self._again[0]:
-            if self._again[0] and number > self._again[0] + self.limits.calm:
-                self.window_lines = min(self.window_lines + 1, self.limits.window_lines)
-                self._again = (number, 0)
-            elif self._again[1]:
-                self._again = (self._again[0], 0)
-        for index in self._log[self._acked + 1 : number + 1]:
-            if 0 <= index < self._total:
-                self.executed = max(self.executed, index + 1)
+        self._in_flight.taken(number)
+        self.executed = max(self.executed, self._log.last_of_program(self._acked + 1, number))
         self._acked = number
+        self._inspection.taken(number)
 
     def _resend(self, number: int) -> None:
         """The firmware misses a line, or says so."""
@@ -251,15 +256,16 @@ class Sender:
         self._moved = self._now
         self._unanswered_asks = 0
         self.resends += 1
-        count = self._again[1] + 1 if number == self._again[0] else 1
-        self._again = (number, count)
+        count = self._in_flight.missed(number)
         if count >= self.limits.resends:
-            what = f"'{self._text(number)}'" if number < len(self._log) else f"number {number}, which was never sent"
+            what = (
+                f"'{self._log.text(number)}'" if number < len(self._log) else f"number {number}, which was never sent"
+            )
             self._end(f"the printer asked {count} times in a row for the line {what}")
         elif number > len(self._log):
             self._want_ask = True
         elif number == self._next_number:
-            if any(n >= number for n, _ in self._in_flight):  # the answer to a question that overtook this line
+            if self._in_flight.reaches(number):  # the answer to a question that overtook this line
                 self._asks = deque(asked for asked in self._asks if asked < number)
                 self._believe(number - 1)
         elif number <= self._acked:
@@ -285,15 +291,9 @@ class Sender:
     def _go_back(self, number: int) -> None:
         """Send from `number` on again, one line at a time until a question is answered."""
         self._doubted = (0, 0)
-        self._recent_resends.append(number)
-        crowded = len(self._recent_resends) == 5 and number - self._recent_resends[0] < self.limits.crowded
-        if crowded and self.window_lines > 1:
-            self.window_lines -= 1  # lost this often: more is under way than the firmware can hold
-            self._recent_resends.clear()
         self._take(number - 1)
         self._next_number = number
-        self._in_flight.clear()
-        self._bytes_in_flight = 0
+        self._in_flight.lost(number)
         self._owed.extend(asked for asked in self._asks if asked < number)
         self._asks.clear()
         self._slow = self._want_ask = True
@@ -315,10 +315,8 @@ class Sender:
         word = text.removeprefix("action:").strip()
         if word == "cancel":
             self._abandon("cancelled at the printer")
-        elif word in ("pause", "paused"):
-            self.paused = True
-        elif word in ("resume", "resumed"):
-            self.paused = False
+        elif word in ("pause", "paused", "resume", "resumed"):
+            self.paused = word.startswith("pause")
 
     # Agreeing on numbers
 
@@ -335,7 +333,7 @@ class Sender:
         elif not self._numbers_agreed:
             self._numbers_agreed = True
             self._asked_at = self._now
-            self._out += self._wire(1)
+            self._out += self._log.wire(1)
         else:
             self._acked, self._next_number = 1, 2
             self._verified = 1 if reply.kind is Kind.OK_REPORT else 0
@@ -349,7 +347,7 @@ class Sender:
         """Move the clock; a gap in which the host slept is no silence of the printer."""
         gap = now - self._now
         if gap > self.limits.jump:
-            for name in ("_since", "_heard", "_alive", "_moved", "_asked_at"):
+            for name in ("_since", "_heard", "_alive", "_moved", "_asked_at", "_where_at"):
                 setattr(self, name, getattr(self, name) + gap)
         self._now = now
 
@@ -358,6 +356,7 @@ class Sender:
         limits, now = self.limits, self._now
         if self.over:
             return
+        self._inspection.due |= now - self._where_at > limits.where
         if self.state is State.GREETING:
             if now - self._since > limits.greeting:
                 self._end(f"nothing that speaks G-code answered within {limits.greeting:g} s")
@@ -393,7 +392,7 @@ class Sender:
         """Send what the window has room for."""
         if self.state not in (State.STREAMING, State.STOPPING):
             return
-        lines = 1 if self._slow else self.window_lines
+        lines = 1 if self._slow else self._in_flight.room
         while len(self._in_flight) < lines:
             number = self._next_number
             new = number == len(self._log)
@@ -402,24 +401,39 @@ class Sender:
                 if index is None:
                     break
                 self._log.append(index)
-            wire = self._wire(number)
-            if self._in_flight and self._bytes_in_flight + len(wire) > self.limits.window_bytes:
+            wire = self._log.wire(number)
+            if not self._in_flight.takes(len(wire)):
                 if new:
                     self._log.pop()
                 break
-            index = self._log[number]
-            if new and index != ASK:
-                self._next_line = index + 1
+            if new:
+                self._first_sent(number)
             self._next_number = number + 1
             self._send(number, wire)
 
     def _next_index(self) -> int | None:
         """What gets the next number: a question that is due, else a line of the program, else nothing."""
+        log = self._log
         if self._want_ask and not self._asks:
             return ASK
-        if self.paused and self.state is State.STREAMING:
-            return None
-        return self._next_line if self._next_line < self._end_of_feed else None
+        at_end = log.next_line >= log.end
+        if self.state is State.STREAMING:
+            if self.paused or self._inspection.waiting:
+                return None
+            question = self._inspection.next(at_end)
+            if question:
+                return QUESTIONS[question]
+        return None if at_end else log.next_line
+
+    def _first_sent(self, number: int) -> None:
+        """What follows from a line going out for the first time."""
+        index = self._log[number]
+        if index >= 0:
+            self._log.next_line = index + 1
+            self._inspection.follow(self._log.text(number))
+        elif index != ASK:
+            self._where_at = self._now
+            self._inspection.ask(Question(self._log.text(number)), number)
 
     def _ask(self) -> None:
         """An M105 under a fresh number, though the window is full; the newline ends a line that lost its own."""
@@ -429,7 +443,7 @@ class Sender:
         if self._next_number == number:
             self._next_number = number + 1
         self._slow = True
-        self._send(number, self._wire(number))
+        self._send(number, self._log.wire(number))
 
     def _send(self, number: int, wire: bytes) -> None:
         if not self._in_flight:
@@ -438,29 +452,22 @@ class Sender:
             self._asks.append(number)
             self._asked_at, self._want_ask = self._now, False
             self.questions += 1
-        elif self._log[number] == self._end_of_feed - 1:
+        elif self._log[number] == self._log.end - 1:
             self._last_needed = number
         self._out += wire
-        self._in_flight.append((number, len(wire)))
-        self._bytes_in_flight += len(wire)
-
-    def _text(self, number: int) -> str:
-        index = self._log[number]
-        return QUESTION if index == ASK else self._program[index]
-
-    def _wire(self, number: int) -> bytes:
-        return numbered(number, self._text(number))
+        self._in_flight.push(number, len(wire))
 
     def _taken(self) -> bytes:
-        out = bytes(self._out)
-        self._out.clear()
-        return out
+        out, self._out = self._out, bytearray()
+        return bytes(out)
 
     # How it ends
 
     def _end_if_complete(self) -> None:
         """Over when the firmware is known to have taken the last number, not merely when enough oks came."""
         if self._last_needed < 0 or self._in_flight or self._next_number < len(self._log):
+            return
+        if self.state is State.STREAMING and not self._inspection.current:
             return
         if max(self._verified, self._answered_plainly) > self._last_needed:
             if self.state is State.STREAMING:
@@ -477,8 +484,7 @@ class Sender:
             self._to(State.STOPPING)
             self.reason = reason
             self._since = self._now
-            self._next_line = max(self._total + 1, 0)
-            self._end_of_feed = len(self._program)
+            self._log.say_farewell()
             self._last_needed = -1
             self._slow = self._want_ask = True
             self._out += b"\nM108\nM410\n"

@@ -4,6 +4,7 @@ Texts are those of Marlin 2.1, with the older spellings that hosts still meet (`
 """
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum, auto
 
@@ -17,7 +18,8 @@ class Kind(Enum):
     RESEND = auto()
     BUSY = auto()
     REPORT = auto()
-    """Temperatures or a position that came by themselves, or while heating is waited for."""
+    """Temperatures that came by themselves, or while heating is waited for."""
+    POSITION = auto()
     START = auto()
     LINE_ERROR = auto()
     """The firmware did not take a line; its Resend follows."""
@@ -38,6 +40,8 @@ class Reply:
     count: int = 1
 
 
+LONGEST = 4096
+"""Bytes without a newline beyond this are noise."""
 OK = Reply(Kind.OK)
 RESEND = re.compile(r"^(?:Resend:|rs)\s*N?(\d+)\s*$")
 OK_LINE = re.compile(r"^(?:ok)+(?=\s|$)")
@@ -53,6 +57,19 @@ LINE_ERROR = re.compile(r"checksum|line number", re.IGNORECASE)
 TALK = re.compile(r"^(?:echo:|Error|FIRMWARE_NAME:|Cap:|PowerUp|wait$|Unknown)")
 START = re.compile(r"^(?:start$|(?:echo:\s*)?Marlin \d)")
 BUSY = re.compile(r"^(?:echo:)?\s*busy:")
+
+
+class Reader:
+    """Bytes in pieces of any size become replies."""
+
+    def __init__(self) -> None:
+        self._rest = bytearray()
+
+    def take(self, data: bytes) -> Iterator[Reply]:
+        """The replies that these bytes complete."""
+        *lines, rest = (self._rest + data).split(b"\n")
+        self._rest = rest if len(rest) < LONGEST else bytearray()
+        return (parse(bytes(line.rstrip(b"\r"))) for line in lines)
 
 
 def parse(line: bytes) -> Reply:
@@ -81,15 +98,15 @@ def parse(line: bytes) -> Reply:
         return Reply(Kind.LINE_ERROR, text, int(last[1]) if last else None)
     if FATAL.search(text) and not text.startswith(("Cap:", "echo:  M")):
         return Reply(Kind.FATAL, text)
-    if TEMPERATURE.match(text) or text.startswith("X:"):
+    if text.startswith("X:"):
+        return Reply(Kind.POSITION, text)
+    if TEMPERATURE.match(text):
         return Reply(Kind.REPORT, text)
     return Reply(Kind.TALK if TALK.match(text) else Kind.NOISE, text)
 
 
 def temperatures(text: str) -> dict[str, tuple[float, float | None]]:
-    """Every heater in a report: actual and, where given, target °C. Positions (`X:..`) hold none."""
-    if text.startswith("X:"):
-        return {}
+    """Every heater in a report: actual and, where given, target °C."""
     return {
         match[1]: (float(match[2]), float(match[3]) if match[3] is not None else None)
         for match in TEMPERATURE.finditer(text)

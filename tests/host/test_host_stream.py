@@ -32,7 +32,7 @@ def program(rows: int, seed: int = 0) -> list[str]:
 
 
 def executed(machine: SoftwareMachine) -> list[str]:
-    return [line for line in machine.executed if not line.startswith(("M105", "M110", "M400"))]
+    return [line for line in machine.executed if not line.startswith(("M105", "M110", "M114", "M400", "M503"))]
 
 
 def machine(*faults: str, seed: int = 5) -> SoftwareMachine:

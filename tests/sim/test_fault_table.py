@@ -33,8 +33,9 @@ def test_every_fault_ends_exactly_or_with_its_reason(bench: ModuleType, kind: st
     if kind in bench.STOPS:
         assert once.verdict == "stopped"
         assert once.reason
-    elif kind in bench.UNSEEN:
+    elif kind in bench.WARNED:
         assert once.verdict == "moved elsewhere"
+        assert len(once.warnings) == 1
     else:
         assert once.verdict == "exact"
     again = bench.repeated(kind)

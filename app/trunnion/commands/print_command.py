@@ -30,7 +30,9 @@ def command(program: Path, machine: str, port: str, baud: int | None) -> None:
     earlier = signal.signal(signal.SIGINT, lambda _number, _frame: stop.set())
     try:
         with Progress(f"printing {program.name}") as progress, open_printer(port, profile, baud) as printer:
-            result = print_program(program, printer, progress=progress.update, stop=stop)
+            result = print_program(
+                program, printer, profile, progress=progress.update, on_warning=progress.warn, stop=stop
+            )
     except StreamError as error:
         click.echo(f"error: {error}", err=True)
         raise SystemExit(1) from None
