@@ -1,7 +1,5 @@
 """Passes over a dome's top on a machine whose platter is singular there."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -33,23 +31,16 @@ def passing(offset_deg):
     )
 
 
-@pytest.mark.parametrize(
-    ("machine", "offset_deg"),
-    [(name, offset) for name in ("open5x_voron0", "open5x_prusa_i3") for offset in (0, 0.1, 1, 5)]
-    + [("rep5x_ender3", offset) for offset in (0, 0.1, 1)],
-)
+@pytest.mark.parametrize("offset_deg", [0, 0.1, 1, 2, 3.5, 5])
+@pytest.mark.parametrize("machine", ["open5x_voron0", "open5x_prusa_i3", "rep5x_ender3"])
 def test_with_tolerance_the_tip_keeps_its_speed_past_the_pole(machine, offset_deg):
-    # Marlin's corners see whole motor steps, and its Z may jump by 0.3 mm/s only: that slows the head, not the pole.
-    profile = dataclasses.replace(load_profile(machine), firmware="reprapfirmware")
+    profile = load_profile(machine)
     toolpath = passing(offset_deg)
     program = plan(toolpath, profile, PrintSettings(nonplanar_axis_tolerance=5.0))
     beads = program.width > 0
     along = np.cumsum(program.tip_length[beads])
     steps = np.abs(np.diff(program.joints, axis=0, prepend=program.start[None]))[beads]
-    # The head machine's Z, at 15 mm/s, cannot follow 30 mm/s of the tip on the dome's flanks, pole or not.
-    straight = [column for column, joint in enumerate(profile.joints) if not joint.rotary]
-    allowed = program.tip_length[beads] / (steps[:, straight] / profile.array("speed")[straight]).max(axis=1)
-    ratio = program.tip_length[beads] / program.duration[beads] / np.minimum(30.0, allowed)
+    ratio = program.tip_length[beads] / program.duration[beads] / 30.0
     assert (ratio[(along > 1.5) & (along < along[-1] - 1.5)] >= 0.8).all()
     assert (steps / program.cruise[beads][:, None] <= profile.array("speed") * (1 + 1e-9)).all()
     ends = np.flatnonzero(beads)[np.append(np.diff(program.source[beads]) != 0, True)]
