@@ -136,8 +136,8 @@ def test_moves_are_acknowledged_until_the_planner_is_full(wire: Wire) -> None:
     assert wire.ask("G91\n") == "ok\n"
     oks = sum(wire.ask("G1 X1 F60\n").count("ok") for _ in range(20))
     assert oks == 15
-    assert wire.ask("", 1.0).count("ok") == 0
-    assert wire.ask("", 0.3).count("ok") == 1
+    assert wire.ask("", 0.9).count("ok") == 0
+    assert wire.ask("", 0.2).count("ok") == 1
 
 
 def test_commanded_end_of_queue_and_motors_now_are_told_apart(wire: Wire) -> None:

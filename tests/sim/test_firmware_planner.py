@@ -8,6 +8,9 @@ import pytest
 from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_sim.firmware.planner import FIRST_MOVE_DELAY, Planner
 
+STEPPING = 0.012
+"""s by which the whole steps of the timer interrupt may end a move early: its slowing down begins a step late, runs
+ahead by another, and stops at 120 steps/s, so that a move to rest saves the few slowest steps."""
 LIMITS_X = (200.0, 2000.0, 8.0)
 """Speed, acceleration and corner speed of X on the cradle; A has 180, 1800 and 8."""
 
@@ -61,7 +64,7 @@ def test_one_move_takes_the_time_of_a_trapezoid(
     profile: MachineProfile, words: dict[str, float], feed: float, length: float, speed: float, acceleration: float
 ) -> None:
     times = run(Planner(profile), [(words, feed)])
-    assert times[-1] == pytest.approx(trapezoid(length, speed, acceleration), rel=1e-2)
+    assert times[-1] == pytest.approx(trapezoid(length, speed, acceleration), rel=2e-3, abs=STEPPING)
 
 
 def test_f_counts_linear_axes_only_when_one_of_them_moves(profile: MachineProfile) -> None:
@@ -70,7 +73,7 @@ def test_f_counts_linear_axes_only_when_one_of_them_moves(profile: MachineProfil
     alone = run(Planner(profile), [({"X": 10.0}, 5.0)])
     assert both[-1] == pytest.approx(alone[-1], rel=2e-3)
     fast_turn = run(Planner(profile), [({"X": 1.0, "A": 90.0}, 100.0)])
-    assert fast_turn[-1] == pytest.approx(trapezoid(90.0, 180.0, 1800.0), rel=1e-2)
+    assert fast_turn[-1] == pytest.approx(trapezoid(90.0, 180.0, 1800.0), abs=STEPPING)
 
 
 def test_filament_speed_limits_a_move(profile: MachineProfile) -> None:
@@ -173,4 +176,6 @@ def test_joints_are_where_the_trapezoid_says_at_every_moment(profile: MachinePro
         1000.0 * t**2,
         np.where(t < 1.0, 2.5 + 100.0 * (t - ramp), 100.0 - 1000.0 * (1.05 - t) ** 2),
     )
-    assert np.abs(x - exact).max() < 0.05
+    behind = exact - x
+    assert behind.max() < 5 / 80.0
+    assert behind.min() > -4 / 80.0

@@ -7,6 +7,7 @@ import numpy as np
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
 from trunnion_sim.firmware import planner_kernel as kernel
+from trunnion_sim.firmware import stepper_kernel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,8 +51,9 @@ class Planner:
         )
         self.state[kernel.RETRACT_ACCELERATION] = extruder.acceleration
         self.state[kernel.MIN_SEGMENT_TIME] = MIN_SEGMENT_TIME
+        self.state[kernel.JERK_TOO] = profile.firmware == "marlin_tcp"
         self._position = self.state[kernel.VECTORS + 2 * n :]
-        self._profile: FloatArray = np.zeros(7)
+        self._trapezoid: FloatArray = np.zeros(stepper_kernel.PLACES)
         self._motors: FloatArray = np.zeros((3, n))
         self._motors[2] = self.limits[kernel.STEPS_PER_UNIT]
         self._records: FloatArray = np.zeros((1024, n + 2))
@@ -70,8 +72,7 @@ class Planner:
         """Run the kernels once on a copy, so that the first move does not wait for the compiler."""
         blocks, state, motors = self.blocks.copy(), self.state.copy(), self._motors.copy()
         kernel.add_block(blocks, self.limits, state, np.ones(self.n), 1.0, 1.0, 0.0, 0.0, self._way)
-        kernel.begin_block(blocks, state, self._profile)
-        kernel.part_done(blocks, state, self._profile, 0.0)
+        kernel.begin_block(blocks, state, self._trapezoid)
         kernel.end_block(blocks, state, motors, self._records[0], 1.0, 0.0)
 
     @property
@@ -118,7 +119,7 @@ class Planner:
             self.moves -= 1
         if self.moves:
             self._began = now
-            self.next_event = now + float(kernel.begin_block(self.blocks, self.state, self._profile))
+            self.next_event = now + float(kernel.begin_block(self.blocks, self.state, self._trapezoid))
             self._running = True
         else:
             self.next_event = np.inf
@@ -167,7 +168,8 @@ class Planner:
         return np.asarray(self._position / self.limits[kernel.STEPS_PER_UNIT])
 
     def _share(self, now: float) -> float:
-        return float(kernel.part_done(self.blocks, self.state, self._profile, now - self._began))
+        ticks = max(int((now - self._began) * stepper_kernel.TIMER_RATE), 0)
+        return float(stepper_kernel.run(self._trapezoid, ticks)[1] / self._trapezoid[stepper_kernel.EVENTS])
 
     def _end(self, share: float, now: float) -> None:
         if self._count == len(self._records):

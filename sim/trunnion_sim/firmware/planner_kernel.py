@@ -1,9 +1,10 @@
 """Marlin's planner arithmetic, compiled: one block in, speeds of all queued blocks out.
 
-Follows `planner.cpp` of Marlin 2.1 (`_populate_block`, `reverse_pass`, `forward_pass`,
-`calculate_trapezoid_for_block`): motion in whole steps, feed by the rule of NIST RS274NGC 2.1.2.5 (XYZ length if that
-moves, else degrees), box limits of speed and acceleration per axis, corners by classic jerk or junction deviation.
-Speeds are in mm/s of the block's own metric. All state is in three float arrays, so a call costs a microsecond.
+Follows `planner.cpp` of Marlin 2.1.2.5 (`_populate_block`, `reverse_pass`, `forward_pass`): motion in whole steps, feed
+by the rule of NIST RS274NGC 2.1.2.5 (XYZ length if that moves, else degrees), box limits of speed and acceleration per
+axis, corners by classic jerk or junction deviation; kinematic builds, as those with tip control are, heed both.
+Speeds are in mm/s of the block's own metric. All state is in three float arrays, so a call costs a microsecond. How the
+steps of a block then fall is `stepper_kernel`'s.
 """
 
 import math
@@ -12,14 +13,12 @@ import numpy as np
 from numba import njit
 
 from trunnion_core.arrays import FloatArray
+from trunnion_sim.firmware import stepper_kernel
 
 MIN_SPEED = 0.05
 """mm/s: MINIMUM_PLANNER_SPEED."""
 MIN_STEPS = 6.0
 """MIN_STEPS_PER_SEGMENT: shorter blocks are left to the next one."""
-MIN_RATE = 31.0
-"""Steps/s: slowest rate of a 16-bit timer at 2 MHz (MINIMAL_STEP_RATE)."""
-
 # Columns of a block.
 MILLIMETERS, NOMINAL_SPEED, ACCELERATION, ENTRY, MAX_ENTRY, NOMINAL_RATE, EVENTS, STEP_ACCELERATION, LINE, STEPS = (
     range(10)
@@ -38,10 +37,9 @@ STEPS_PER_UNIT, MAX_SPEED, MAX_ACCELERATION, JERK, ROTARY = range(5)
     TRAVEL_ACCELERATION,
     RETRACT_ACCELERATION,
     MIN_SEGMENT_TIME,
+    JERK_TOO,
     VECTORS,
-) = range(11)
-# Results of `begin_block`.
-DURATION, INITIAL_RATE, CRUISE_RATE, FINAL_RATE, ACCELERATE_STEPS, DECELERATE_AFTER, PROFILE_ACCELERATION = range(7)
+) = range(12)
 
 
 @njit(cache=True)
@@ -88,10 +86,10 @@ def add_block(
     if events < MIN_STEPS:
         return False
     millimeters = math.sqrt(linear2 if linear2 >= 1e-6 else rotary2)
-    if length > 0:
-        millimeters = length
-    elif moving_axes == 0:
+    if moving_axes == 0:
         millimeters = abs(row[STEPS + e]) / limits[STEPS_PER_UNIT, e]
+    elif length > 0:
+        millimeters = length
     for i in range(n):
         wanted = min(max(target[i] * limits[STEPS_PER_UNIT, i], -2147483648.0), 2147483647.0)
         state[position + i] = math.floor(wanted + 0.5)
@@ -109,6 +107,7 @@ def add_block(
         speed = abs(row[STEPS + i]) / limits[STEPS_PER_UNIT, i] * inverse_secs
         if speed > limits[MAX_SPEED, i]:
             factor = min(factor, limits[MAX_SPEED, i] / speed)
+    nominal_rate = math.floor(math.ceil(events * inverse_secs) * factor)
     inverse_secs *= factor
     nominal_speed = millimeters * inverse_secs
 
@@ -130,7 +129,7 @@ def add_block(
 
     row[MILLIMETERS] = millimeters
     row[NOMINAL_SPEED] = nominal_speed
-    row[NOMINAL_RATE] = math.ceil(events * inverse_secs)
+    row[NOMINAL_RATE] = max(nominal_rate, 1.0)
     row[EVENTS] = events
     row[STEP_ACCELERATION] = acceleration
     row[ACCELERATION] = acceleration / steps_per_mm
@@ -141,9 +140,11 @@ def add_block(
         for i in range(n):
             change = way[i] if length > 0 else row[STEPS + i] / limits[STEPS_PER_UNIT, i]
             unit[i] = change / millimeters
-        corner2 = _junction_deviation(row, limits, state, waiting + int(state[BUSY]), unit)
+        corner2 = _junction_deviation(row, limits, state, waiting, unit)
+        if state[JERK_TOO] > 0:
+            corner2 = min(corner2, _classic_jerk(row, limits, state, waiting, inverse_secs))
     else:
-        corner2 = _classic_jerk(row, limits, state, waiting + int(state[BUSY]), inverse_secs)
+        corner2 = _classic_jerk(row, limits, state, waiting, inverse_secs)
     row[MAX_ENTRY] = corner2
     state[PREVIOUS_NOMINAL] = nominal_speed
     for i in range(n):
@@ -200,43 +201,49 @@ def _classic_jerk(row: FloatArray, limits: FloatArray, state: FloatArray, moves:
 def _junction_deviation(row: FloatArray, limits: FloatArray, state: FloatArray, moves: int, unit: FloatArray) -> float:
     """Square of the corner speed by centripetal acceleration; all axes in one vector, mm and degrees alike.
 
-    `unit` (n,) is the change of every axis per mm of the block; it is made a unit vector in place.
+    `unit` (n,) is the change of every axis per mm of the block. Only that of a block that feeds is made a unit vector;
+    turning travels count as longer than one, which makes their corners look straight (`_populate_block`).
     """
     n = limits.shape[1]
-    length2 = 0.0
-    for i in range(n):
-        length2 += unit[i] * unit[i]
-    if row[STEPS + n - 1] != 0 or length2 > 1.0 + 1e-9:
+    if row[STEPS + n - 1] != 0:
+        size = 0.0
         for i in range(n):
-            unit[i] /= math.sqrt(length2)
+            size += unit[i] * unit[i]
+        for i in range(n):
+            unit[i] /= math.sqrt(size)
     corner2 = 0.0
     if moves > 0 and state[PREVIOUS_NOMINAL] > 1e-6:
         cosine = 0.0
+        turn2 = 0.0
         for i in range(n):
             cosine -= state[VECTORS + n + i] * unit[i]
+            turn2 += (unit[i] - state[VECTORS + n + i]) ** 2
         if cosine > 0.999999:
             corner2 = MIN_SPEED * MIN_SPEED
         else:
             cosine = max(cosine, -0.999999)
-            turn = np.empty(n)
-            turn2 = 0.0
-            for i in range(n):
-                turn[i] = unit[i] - state[VECTORS + n + i]
-                turn2 += turn[i] * turn[i]
             acceleration = row[ACCELERATION]
             for i in range(n):
-                part = abs(turn[i]) / math.sqrt(turn2)
-                if part > 0 and acceleration * part > limits[MAX_ACCELERATION, i]:
-                    acceleration = limits[MAX_ACCELERATION, i] / part
+                part = abs(unit[i] - state[VECTORS + n + i])
+                if part > 0 and acceleration * part > limits[MAX_ACCELERATION, i] * math.sqrt(turn2):
+                    acceleration = limits[MAX_ACCELERATION, i] * math.sqrt(turn2) / part
             half = math.sqrt(0.5 * (1.0 - cosine))
             corner2 = acceleration * state[JUNCTION_DEVIATION] * half / (1.0 - half)
             if row[MILLIMETERS] < 1.0 and cosine < -0.7071067812:
-                angle = math.acos(-cosine)
-                corner2 = min(corner2, row[MILLIMETERS] * acceleration / angle)
+                corner2 = min(corner2, row[MILLIMETERS] * acceleration / _small_angle(-cosine))
         corner2 = min(corner2, row[NOMINAL_SPEED] ** 2, state[PREVIOUS_NOMINAL] ** 2)
     for i in range(n):
         state[VECTORS + n + i] = unit[i]
     return float(corner2)
+
+
+@njit(cache=True)
+def _small_angle(t: float) -> float:
+    """Angle in rad whose cosine is `t` > 0, by the polynomial that Marlin uses: never below 0.033."""
+    sine = 0.032843707 + t * (
+        -1.451838349 + t * (29.66153956 + t * (-131.1123477 + t * (262.8130562 + t * (-242.7199627 + t * 84.31466202))))
+    )
+    return math.pi / 2 - sine
 
 
 @njit(cache=True)
@@ -261,40 +268,24 @@ def _look_ahead(blocks: FloatArray, state: FloatArray) -> None:
 
 
 @njit(cache=True)
-def begin_block(blocks: FloatArray, state: FloatArray, profile: FloatArray) -> float:
-    """Fix the trapezoid of the oldest block in `profile`, mark it as running; returns its duration in s."""
+def begin_block(blocks: FloatArray, state: FloatArray, trapezoid: FloatArray) -> float:
+    """Fix the trapezoid of the oldest block in `trapezoid`, mark it as running; returns its duration in s."""
     size = blocks.shape[0]
     tail = int(state[TAIL])
     row = blocks[tail]
     following = (tail + 1) % size
     leaving2 = blocks[following, ENTRY] if following != int(state[HEAD]) else MIN_SPEED * MIN_SPEED
     state[BUSY] = 1.0
-    rate = row[NOMINAL_RATE]
-    scale = rate / row[NOMINAL_SPEED]
-    slow = min(MIN_RATE, rate)
-    first = min(max(math.ceil(math.sqrt(row[ENTRY]) * scale), slow), rate)
-    last = min(max(math.ceil(math.sqrt(leaving2) * scale), slow), rate)
-    acceleration = row[STEP_ACCELERATION]
-    events = row[EVENTS]
-    up = (rate * rate - first * first) / (2.0 * acceleration)
-    down = (rate * rate - last * last) / (2.0 * acceleration)
-    cruise = rate
-    if up + down > events:
-        up = (events + (last * last - first * first) / (2.0 * acceleration)) / 2.0
-        up = min(max(up, 0.0), events)
-        down = events - up
-        cruise = math.sqrt(first * first + 2.0 * acceleration * up)
-        last = math.sqrt(max(cruise * cruise - 2.0 * acceleration * down, last * last))
-    profile[INITIAL_RATE] = first
-    profile[CRUISE_RATE] = cruise
-    profile[FINAL_RATE] = last
-    profile[ACCELERATE_STEPS] = up
-    profile[DECELERATE_AFTER] = events - down
-    profile[PROFILE_ACCELERATION] = acceleration
-    time = (cruise - first) / acceleration + (events - up - down) / cruise
-    time += 2.0 * down / (cruise + last)
-    profile[DURATION] = time
-    return float(time)
+    stepper_kernel.shape(
+        trapezoid,
+        row[EVENTS],
+        row[NOMINAL_RATE],
+        row[STEP_ACCELERATION],
+        math.sqrt(row[ENTRY]) / row[NOMINAL_SPEED],
+        math.sqrt(leaving2) / row[NOMINAL_SPEED],
+    )
+    ticks, _ = stepper_kernel.run(trapezoid, stepper_kernel.NEVER)
+    return ticks / stepper_kernel.TIMER_RATE
 
 
 @njit(cache=True)
@@ -317,22 +308,3 @@ def end_block(
     record[n + 1] = time
     state[TAIL] = (int(state[TAIL]) + 1) % blocks.shape[0]
     state[BUSY] = 0.0
-
-
-@njit(cache=True)
-def part_done(blocks: FloatArray, state: FloatArray, profile: FloatArray, elapsed: float) -> float:
-    """Share of the running block's steps made `elapsed` s after its begin."""
-    events = blocks[int(state[TAIL]), EVENTS]
-    acceleration = profile[PROFILE_ACCELERATION]
-    first, cruise = profile[INITIAL_RATE], profile[CRUISE_RATE]
-    up, after = profile[ACCELERATE_STEPS], profile[DECELERATE_AFTER]
-    t_up = (cruise - first) / acceleration
-    t_cruise = (after - up) / cruise
-    if elapsed < t_up:
-        done = first * elapsed + acceleration * elapsed * elapsed / 2.0
-    elif elapsed < t_up + t_cruise:
-        done = up + cruise * (elapsed - t_up)
-    else:
-        late = elapsed - t_up - t_cruise
-        done = after + cruise * late - acceleration * late * late / 2.0
-    return float(min(max(done / events, 0.0), 1.0))
