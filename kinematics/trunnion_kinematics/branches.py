@@ -198,7 +198,7 @@ def _shift_into_limits(
     rotary: IntArray, joints: FloatArray, windings: IntArray, low: FloatArray, high: FloatArray, may_shift: bool
 ) -> bool:
     """Whether rotaries whose windings were left free stay within limits, if need be after whole turns."""
-    from trunnion_kinematics.choice_kernels import TURN
+    from trunnion_kinematics.winding_kernels import TURN
 
     for r in np.flatnonzero(windings == 0):
         angle = joints[:, rotary[r]]

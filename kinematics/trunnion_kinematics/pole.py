@@ -34,7 +34,7 @@ def straighten(
     The ends of a run stay. The tool leans at most axis_tolerance rad from tool_axes (n, 3), the tip stays on points
     (n, 3). A run in which a joint would pass its limit stays as it was.
     """
-    from trunnion_kinematics.choice_kernels import lean_kernel, string_kernel
+    from trunnion_kinematics.pole_kernels import lean_kernel, string_kernel
 
     points = np.array(points, dtype=np.float64)
     low, high = tube(chain, points, tool_axes, joints, axis_tolerance)
