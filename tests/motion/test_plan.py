@@ -133,7 +133,7 @@ def test_retractions_bracket_the_travels(profile, dome, settings):
     assert (steps[retracts] == 0).all()
     assert (steps[primes] == 0).all()
     acceleration = profile.extruder.acceleration
-    speed = settings.retract_speed
+    speed = min(settings.retract_speed, profile.extruder.speed)
     expected = settings.retract_length / speed + speed / acceleration
     triangle = 2 * np.sqrt(settings.retract_length / acceleration)
     wanted = expected if settings.retract_length > speed**2 / acceleration else triangle
