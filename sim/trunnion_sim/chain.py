@@ -15,6 +15,11 @@ ROWS_AT_ONCE = 1 << 15
 
 def forward(profile: MachineProfile, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Tip (n, 3) mm and tool axis (n, 3) unit in `part`, for joints (n, k) mm or rad in profile order."""
+    if not profile.rotary:
+        # every joint only shifts: one matrix, and the tool never leans
+        tip, axis = _forward(profile, np.zeros((1, joints.shape[1])))
+        ways = np.stack([joint.axis * (1 if joint.side == "tool" else -1) for joint in profile.joints])
+        return tip + joints @ ways, np.broadcast_to(axis[0], (len(joints), 3))
     points = np.empty((len(joints), 3))
     tool_axes = np.empty((len(joints), 3))
     for begin in range(0, len(joints), ROWS_AT_ONCE):

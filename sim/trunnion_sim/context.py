@@ -20,6 +20,7 @@ from trunnion_sim.collision.sweep import Hits, sweep
 from trunnion_sim.limits import Limits
 from trunnion_sim.motion import Motion
 from trunnion_sim.notes import Notes, RowNotes
+from trunnion_sim.pressure import Pressure, pressure
 from trunnion_sim.reader import FileEnd
 from trunnion_sim.replay import Replay, pieces, samples
 from trunnion_sim.rules import Rules
@@ -29,6 +30,8 @@ TURN_STEP = math.radians(1.0)
 """rad that a rotary turns between two looks inside a row: 0.006 mm of arc height at 150 mm from the pivot."""
 CELLS_ACROSS = 4.0
 """Cells of the height field across a bead where only contacts are looked for, not the surface."""
+STRETCH = 1 << 17
+"""Rows of which all that lies between their ends is in memory together."""
 GAP = 3
 """Rows between two offending rows that still belong to one finding."""
 MOST = 40
@@ -52,6 +55,20 @@ class LineOddities:
 
 
 @dataclass(frozen=True, eq=False)
+class Stretch:
+    """Some consecutive rows cut into pieces so short that arcs of rotaries are seen; `part` frame."""
+
+    rows: IntArray
+    """(m,) the row of each piece."""
+    starts: FloatArray
+    """(m, 3) mm, tip."""
+    points: FloatArray
+    """(m, 3) mm, tip at the end of the piece."""
+    tool_axes: FloatArray
+    """(m, 3) unit."""
+
+
+@dataclass(frozen=True, eq=False)
 class Context:
     """One judged program. Rows are those of `motion`."""
 
@@ -62,17 +79,30 @@ class Context:
     rows: RowNotes
     limits: Limits
     replay: Replay
-    points: FloatArray
-    """(n, 3) mm, tip in `part` at the end of each row."""
-    tool_axes: FloatArray
-    """(n, 3)."""
+    tips: FloatArray
+    """(n + 1, 3) mm, tip in `part` at the start and at the end of each row."""
+    axes: FloatArray
+    """(n + 1, 3) unit, tool axis there."""
     oddities: LineOddities
     end: FileEnd
+
+    @property
+    def points(self) -> FloatArray:
+        """(n, 3) mm, tip in `part` at the end of each row."""
+        return self.tips[1:]
+
+    @property
+    def tool_axes(self) -> FloatArray:
+        """(n, 3)."""
+        return self.axes[1:]
 
     @cached_property
     def moved(self) -> BoolArray:
         """(n,) whether a joint moves on the row."""
-        return np.asarray((np.abs(self.motion.joints - self.motion.before) > 1e-9).any(axis=1))
+        moved = np.zeros(len(self.motion), np.bool_)
+        for column in range(len(self.profile.joints)):
+            moved |= np.abs(np.diff(self.motion.path[:, column])) > 1e-9
+        return moved
 
     @cached_property
     def homing(self) -> BoolArray:
@@ -88,35 +118,52 @@ class Context:
     @cached_property
     def feeds(self) -> BoolArray:
         """(n,) whether the row moves and lays plastic."""
-        return self.moved & ~self.homing & (self.motion.filament > 0)
+        plastic = self.motion.filament > 0
+        if self.pressure is not None:
+            # Words that carry pressure advance may draw back while the bead goes on.
+            plastic |= self.rows.bead & (self.laid > 0)
+        return self.moved & ~self.homing & plastic
+
+    @cached_property
+    def pressure(self) -> Pressure | None:
+        """The flow behind what is pushed; None where the program does not tell how far behind it is."""
+        return pressure(self.motion, self.replay, self.profile, self.rules, self.notes.header)
+
+    @cached_property
+    def laid(self) -> FloatArray:
+        """(n,) mm of filament that leave the nozzle on the row: behind pressure where that is known, else as fed."""
+        return self.motion.filament if self.pressure is None else self.pressure.laid
 
     @cached_property
     def priming(self) -> BoolArray:
         """(n,) whether the row lies before the first layer that the comments name: lines that only fill the nozzle."""
         return np.asarray((self.rows.layer < 0) & (self.rows.layer >= 0).any())
 
-    @cached_property
-    def inside(self) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Rows (m,), tip (m, 3) and tool axis (m, 3) along the motion, so close that arcs of rotaries are seen."""
-        rows, fractions = pieces(self.motion, self.profile, TURN_STEP)
-        whole = fractions >= 1.0
-        if whole.all():
-            return rows, self.points, self.tool_axes
-        points, axes = self.points[rows], self.tool_axes[rows]
-        points[~whole], axes[~whole] = forward(self.profile, samples(self.motion, rows[~whole], fractions[~whole]))
-        return rows, points, axes
+    def stretches(self) -> Iterator[Stretch]:
+        """The whole motion, STRETCH rows at a time."""
+        for begin in range(0, len(self.motion), STRETCH):
+            part = self.motion.part(begin, begin + STRETCH)
+            tips, axes = self.tips[begin : begin + len(part) + 1], self.axes[begin + 1 : begin + len(part) + 1]
+            rows, fractions = pieces(part, self.profile, TURN_STEP)
+            whole = fractions >= 1.0
+            if whole.all():
+                yield Stretch(rows + begin, tips[:-1], tips[1:], axes)
+                continue
+            points, tool_axes = tips[1:][rows], axes[rows]
+            points[~whole], tool_axes[~whole] = forward(self.profile, samples(part, rows[~whole], fractions[~whole]))
+            yield Stretch(rows + begin, np.concatenate([tips[:1], points[:-1]]), points, tool_axes)
 
     @cached_property
     def tip_length(self) -> FloatArray:
         """(n,) mm that the tip travels over the part on each row, arcs followed."""
-        rows, points, _ = self.inside
-        if not len(rows):
-            return np.zeros(0)
-        start, _ = forward(self.profile, self.motion.start[None])
-        steps = np.linalg.norm(np.diff(points, axis=0, prepend=start), axis=1)
-        return np.asarray(np.bincount(rows, weights=steps, minlength=len(self.motion)), dtype=np.float64)
+        length = np.zeros(len(self.motion))
+        for part in self.stretches():
+            first, last = int(part.rows[0]), int(part.rows[-1]) + 1
+            way = np.linalg.norm(part.points - part.starts, axis=1)
+            length[first:last] = np.bincount(part.rows - first, weights=way, minlength=last - first)
+        return length
 
-    @cached_property
+    @property
     def deposit(self) -> Deposit | None:
         """The beads laid down over the part, and what every row met; None where nothing is laid."""
         return self.lay_down(self.bead_width / CELLS_ACROSS)
@@ -144,27 +191,40 @@ class Context:
         beads = self.feeds & present
         if not beads.any():
             return None
-        rows, points, axes = self.inside
-        start, _ = forward(self.profile, self.motion.start[None])
-        starts = np.concatenate([start, points[:-1]])
-        way = np.linalg.norm(points - starts, axis=1)
-        whole = self.tip_length[rows]
-        volume = np.where(self.feeds, self.motion.filament * self.profile.filament_area, 0.0)[rows]
-        share = np.divide(volume * way, whole, out=np.zeros(len(rows)), where=whole > 0)
         if bounds is None:
             core = beads & (self.rows.role != Role.SKIRT) & ~self.priming
-            over = points[(core if core.any() else beads)[rows]][:, :2]
-            bounds = over.min(axis=0) - 2.0, over.max(axis=0) + 2.0
-        motions = Pieces(rows, starts, points, axes, share, present[rows])
+            bounds = self._reach(core if core.any() else beads)
+        motions = (self._laid(stretch, present) for stretch in self.stretches())
         flat, bore = self.profile.nozzle_flat_diameter, self.profile.nozzle_diameter
         return lay_down(motions, len(self.motion), *bounds, cell, flat, bore)
+
+    def _laid(self, stretch: Stretch, present: BoolArray) -> Pieces:
+        """What a stretch lays down: the plastic of each row, shared among its pieces by their length."""
+        rows = stretch.rows
+        way = np.linalg.norm(stretch.points - stretch.starts, axis=1)
+        volume = np.where(self.feeds[rows], self.laid[rows] * self.profile.filament_area, 0.0)
+        whole = self.tip_length[rows]
+        share = np.divide(volume * way, whole, out=np.zeros(len(rows)), where=whole > 0)
+        axes = np.ascontiguousarray(stretch.tool_axes)
+        return Pieces(rows, stretch.starts, stretch.points, axes, share, present[rows])
+
+    def _reach(self, beads: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Low and high corner (2,) mm in X and Y of everywhere that rows `beads` (n,) lead, 2 mm wider."""
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        for stretch in self.stretches():
+            over = stretch.points[beads[stretch.rows], :2]
+            low, high = (
+                np.minimum(low, over.min(axis=0, initial=np.inf)),
+                np.maximum(high, over.max(axis=0, initial=-np.inf)),
+            )
+        return low - 2.0, high + 2.0
 
     @cached_property
     def scene(self) -> Scene:
         """The machine's bodies, its bed and clamps, for collision."""
         return make_scene(self.profile)
 
-    @cached_property
+    @property
     def bead_height(self) -> FloatArray:
         """(n,) mm: as the comments say, else half the bore."""
         known = self.rows.height
@@ -173,18 +233,18 @@ class Context:
     @cached_property
     def stadium_width(self) -> FloatArray:
         """(n,) mm across a stadium (a rectangle and two half-discs) of the fed volume; 0 where no bead is laid."""
+        height = self.bead_height
         area = np.divide(
-            self.motion.filament * self.profile.filament_area,
+            self.laid * self.profile.filament_area,
             self.tip_length,
             out=np.zeros(len(self.motion)),
             where=self.feeds & (self.tip_length > 0),
         )
-        return np.where(area > 0, area / self.bead_height + (1 - math.pi / 4) * self.bead_height, 0.0)
+        return np.where(area > 0, area / height + (1 - math.pi / 4) * height, 0.0)
 
     @cached_property
     def hits(self) -> Hits:
         """Where bodies enter what stands on the bed; homing is the machine's own business."""
-        start_tip, start_axis = forward(self.profile, self.motion.start[None])
         return sweep(
             self.scene,
             self.motion.joints,
@@ -193,7 +253,7 @@ class Context:
             self.stadium_width,
             self.bead_height,
             ~self.homing,
-            first=(self.motion.start, start_tip[0], start_axis[0]),
+            first=(self.motion.start, self.tips[0], self.axes[0]),
         )
 
     def find(

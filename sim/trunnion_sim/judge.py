@@ -58,7 +58,7 @@ def context_of(program: Path, profile: MachineProfile) -> Context:
         raise GcodeError(f"{program}: {reader.end.lines} lines hold no command, should be a G-code program")
     if not motion.code_count:
         raise GcodeError(f"{program}: no line holds a G, M or T command, should be a G-code program")
-    points, tool_axes = forward(profile, motion.joints)
+    tips, axes = forward(profile, motion.path)
     limits = limits_of(motion, profile, rules.slowest)
     return Context(
         profile=profile,
@@ -68,8 +68,8 @@ def context_of(program: Path, profile: MachineProfile) -> Context:
         rows=row_notes(notes, motion.line),
         limits=limits,
         replay=replay(motion, profile, rules, limits),
-        points=points,
-        tool_axes=tool_axes,
+        tips=tips,
+        axes=axes,
         oddities=oddities.result(),
         end=reader.end,
     )
@@ -135,7 +135,7 @@ class _Oddities:
 
 def _report(context: Context, findings: tuple[Finding, ...], surface: SurfaceReport | None) -> Report:
     motion, replayed, profile = context.motion, context.replay, context.profile
-    volume = motion.filament * profile.filament_area
+    volume = context.laid * profile.filament_area
     trace = Trace(motion.line, motion.joints, context.points, context.tool_axes, volume, replayed.end)
     moving = context.feeds & (replayed.duration > 0)
     flow = np.divide(volume * replayed.cruise, replayed.length, out=np.zeros(len(volume)), where=replayed.length > 0)
@@ -144,7 +144,7 @@ def _report(context: Context, findings: tuple[Finding, ...], surface: SurfaceRep
         trace=trace,
         time=replayed.time,
         filament=float(motion.filament.sum()),
-        volume=float(volume.sum()),
+        volume=float(motion.filament.sum() * profile.filament_area),
         joints=_joint_use(motion, context, profile),
         tip_speed=_tip_speed(context, moving),
         flow={
@@ -160,23 +160,19 @@ def _report(context: Context, findings: tuple[Finding, ...], surface: SurfaceRep
 
 def _joint_use(motion: Motion, context: Context, profile: MachineProfile) -> dict[str, JointUse]:
     replayed = context.replay
-    delta = np.abs(motion.joints - motion.before) * profile.to_shown
-    per_length = np.divide(
-        delta, replayed.length[:, None], out=np.zeros_like(delta), where=replayed.length[:, None] > 0
-    )
-    per_length[context.homing] = 0.0
-    speed = per_length * replayed.cruise[:, None]
-    acceleration = per_length * replayed.acceleration[:, None]
-    shown = motion.joints * profile.to_shown
-    return {
-        joint.letter: JointUse(
-            min=float(shown[:, k].min()) if len(shown) else 0.0,
-            max=float(shown[:, k].max()) if len(shown) else 0.0,
-            peak_speed=float(speed[:, k].max(initial=0.0)),
-            peak_acceleration=float(acceleration[:, k].max(initial=0.0)),
+    counts = (replayed.length > 0) & ~context.homing
+    use = {}
+    for k, joint in enumerate(profile.joints):
+        way = np.abs(np.diff(motion.path[:, k]))
+        per_length = np.divide(way, replayed.length, out=np.zeros(len(way)), where=counts)
+        value = motion.joints[:, k] if len(motion) else np.zeros(1)
+        use[joint.letter] = JointUse(
+            min=joint.shown(float(value.min())),
+            max=joint.shown(float(value.max())),
+            peak_speed=joint.shown(float((per_length * replayed.cruise).max(initial=0.0))),
+            peak_acceleration=joint.shown(float((per_length * replayed.acceleration).max(initial=0.0))),
         )
-        for k, joint in enumerate(profile.joints)
-    }
+    return use
 
 
 def _tip_speed(context: Context, moving: BoolArray) -> dict[str, float | None]:

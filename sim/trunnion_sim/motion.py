@@ -7,7 +7,7 @@ The state machine runs over the words in one compiled loop and is carried from b
 import dataclasses
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +18,7 @@ from trunnion_core.errors import GcodeError
 from trunnion_core.profile import MachineProfile
 from trunnion_sim import motion_kernel as kernel
 from trunnion_sim.reader import Block
+from trunnion_sim.row_store import RowStore
 from trunnion_sim.rules import Rules
 from trunnion_sim.tip_rows import cut_words, joints_of_tips, pieces_of_tips
 
@@ -30,7 +31,7 @@ class Command:
     row: int
     letter: str
     code: int
-    """Ten times the number."""
+    """Ten times the number; -1 where the command has a name instead, which is then the letter."""
     words: tuple[tuple[str, float], ...]
 
     def get(self, letter: str) -> float | None:
@@ -54,10 +55,8 @@ class Motion:
     """(n,) line in the file, from 1."""
     kind: NDArray[np.uint8]
     """(n,) of `motion_kernel`: RAPID, LINEAR, ARC, HOME."""
-    start: FloatArray
-    """(k,) mm or rad: where the joints are taken to stand at the start."""
-    joints: FloatArray
-    """(n, k) mm or rad at the end of the row."""
+    path: FloatArray
+    """(n + 1, k) mm or rad: the joints where they are taken to stand at the start, then at the end of every row."""
     filament: FloatArray
     """(n,) mm fed, after M221."""
     feed: FloatArray
@@ -66,11 +65,11 @@ class Motion:
     """(n,) whether the feed is G93 inverse time."""
     relative: BoolArray
     """(n,) whether axis words were relative (G91)."""
-    homed: IntArray
+    homed: NDArray[np.uint8]
     """(n,) bits of the joints that were homed when the row ran."""
     dwell: FloatArray
     """(n,) s of rest before the row; NaN where the machine only waits for its queue to empty; 0 if neither."""
-    bytes: IntArray
+    bytes: NDArray[np.int32]
     """(n,) of the line as it is sent, without number and checksum; 0 on further pieces of an arc."""
     commands: tuple[Command, ...]
     """Every non-motion command worth keeping, in order."""
@@ -86,9 +85,27 @@ class Motion:
         return len(self.line)
 
     @property
+    def start(self) -> FloatArray:
+        """(k,) joints before the first row."""
+        return np.asarray(self.path[0])
+
+    @property
+    def joints(self) -> FloatArray:
+        """(n, k) joints at the end of every row."""
+        return self.path[1:]
+
+    @property
     def before(self) -> FloatArray:
         """(n, k) joints at the start of every row."""
-        return np.concatenate([self.start[None], self.joints[:-1]])
+        return self.path[:-1]
+
+    def part(self, begin: int, end: int) -> "Motion":
+        """The rows from `begin` to `end` without copying them; commands are left out."""
+        cut = {name: getattr(self, name)[begin:end] for name in PER_ROW}
+        return dataclasses.replace(self, path=self.path[begin : end + 1], commands=(), **cut)
+
+
+PER_ROW = ("line", "kind", "filament", "feed", "inverse", "relative", "homed", "dwell", "bytes", "of_tip")
 
 
 KEPT = (
@@ -104,8 +121,10 @@ KEPT = (
 )
 """Non-motion commands whose words matter later."""
 
-MOST_ROWS = 3_000_000
-"""Motions of one program: judging needs about 0.6 kB for each, and 2 GB should do."""
+MOST_PIECES = 20_000
+"""Room for the pieces of an arc, of which there are 10,000 at most, beside a row for every line."""
+MOST_ROWS = 6_000_000
+"""Motions of one program: judging needs about 0.3 kB for each, and 2 GB should do."""
 
 
 def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) -> Motion:
@@ -118,58 +137,51 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
     rotary = np.array([joint.rotary for joint in profile.joints])
     home = profile.array("home") * profile.to_shown
     state = kernel.fresh_state(k)
-    parts = [kernel.fresh_rows(0, k)]
+    store = RowStore(k)
     commands: list[Command] = []
     first_line: dict[tuple[str, int], int] = {}
     count: Counter[tuple[str, int]] = Counter()
     dropped: dict[str, list[int]] = {}
-    rows = 0
     for block in blocks:
         at = 0
         m = len(block.line)
         row_of_command = np.zeros(m, np.int64)
         problem = np.zeros(m, np.int64)
         while at < m:
-            room = m - at + 20000
-            out = kernel.fresh_rows(room, k)
+            out = store.room(m - at + MOST_PIECES)
             at, made = kernel.execute(
                 at, block.letter, block.code, block.flags, block.word_start, block.word_letter, block.word_value,
                 block.line, block.length, letters, rotary, home, rules.g90_resets_e, rules.case_sensitive,
-                ord(rules.filament), state, out, row_of_command, problem, rows,
+                ord(rules.filament), state, out, row_of_command, problem, len(store),
             )  # fmt: skip
-            parts.append(kernel.joined([out], made))
-            rows += made
-            if rows > MOST_ROWS:
+            store.take(made)
+            if len(store) > MOST_ROWS:
                 raise GcodeError(
                     f"line {int(block.line[at - 1])}: here the program has more than {MOST_ROWS:,} motions, "
                     "which is the most that is judged in one piece; split it"
                 )
         _collect(block, row_of_command, commands, first_line, count)
+        commands += _named(block, row_of_command, rules.names)
         for code, reason in kernel.PROBLEMS.items():
             hit = block.line[problem == code]
             if hit.size:
                 dropped.setdefault(reason, []).extend(hit.tolist())
-    joined = kernel.joined(parts)
-    start = np.zeros(k)
-    of_tip = _of_tip(commands, joined.kind, rules)
-    joints = joints_of_tips(profile, joined.joints / profile.to_shown, of_tip)
-    pieces = pieces_of_tips(profile, start, joints, of_tip, joined.filament > 0)
-    if (pieces > 1).any():
-        joined, commands = _cut(profile, start, joints, joined, pieces, commands)
-        of_tip = np.repeat(of_tip, pieces)
-        joints = joints_of_tips(profile, joined.joints / profile.to_shown, of_tip)
+    rows, path = store.finished()
+    path /= profile.to_shown
+    of_tip = _of_tip(commands, rows.kind, rules)
+    if of_tip.any():
+        rows, path, of_tip, commands = _followed(profile, rows, path[0], of_tip, commands)
     return Motion(
-        line=joined.line,
-        kind=joined.kind,
-        start=start,
-        joints=joints,
-        filament=joined.filament,
-        feed=joined.feed,
-        inverse=(joined.flags & kernel.INVERSE) > 0,
-        relative=(joined.flags & kernel.RELATIVE) > 0,
-        homed=joined.homed,
-        dwell=joined.dwell,
-        bytes=joined.bytes,
+        line=rows.line,
+        kind=rows.kind,
+        path=path,
+        filament=rows.filament,
+        feed=rows.feed,
+        inverse=(rows.flags & kernel.INVERSE) > 0,
+        relative=(rows.flags & kernel.RELATIVE) > 0,
+        homed=rows.homed,
+        dwell=rows.dwell,
+        bytes=rows.bytes,
         commands=tuple(commands),
         code_first_line=first_line,
         code_count=count,
@@ -188,6 +200,19 @@ def _of_tip(commands: list[Command], kind: NDArray[np.uint8], rules: Rules) -> B
     return np.asarray(named & (kind != kernel.HOME))
 
 
+def _followed(
+    profile: MachineProfile, rows: kernel.Rows, start: FloatArray, of_tip: BoolArray, commands: list[Command]
+) -> tuple[kernel.Rows, FloatArray, BoolArray, list[Command]]:
+    """Rows, path, which rows name the tip, and commands, when rows that name the tip are followed in joints."""
+    joints = joints_of_tips(profile, rows.joints, of_tip)
+    pieces = pieces_of_tips(profile, start, joints, of_tip, rows.filament > 0)
+    if (pieces > 1).any():
+        rows, commands = _cut(profile, start, joints, rows, pieces, commands)
+        of_tip = np.repeat(of_tip, pieces)
+        joints = joints_of_tips(profile, rows.joints, of_tip)
+    return rows, np.concatenate([start[None], joints]), of_tip, commands
+
+
 def _cut(
     profile: MachineProfile,
     start: FloatArray,
@@ -197,12 +222,12 @@ def _cut(
     commands: list[Command],
 ) -> tuple[kernel.Rows, list[Command]]:
     """Rows cut into `count` (n,) pieces each, and the commands before them; rests and bytes stay with the first."""
-    rows, piece, words = cut_words(profile, start, joints, made.joints / profile.to_shown, count)
+    rows, piece, words = cut_words(profile, start, joints, made.joints, count)
     first = piece == 1
     pieces = kernel.Rows(
         line=made.line[rows],
         kind=made.kind[rows],
-        joints=words * profile.to_shown,
+        joints=words,
         filament=made.filament[rows] / count[rows],
         feed=np.where(made.flags[rows] & kernel.INVERSE, made.feed[rows] * count[rows], made.feed[rows]),
         flags=made.flags[rows],
@@ -244,7 +269,27 @@ def _collect(
         commands.append(Command(int(block.line[i]), int(rows[i]), chr(int(block.letter[i])), int(block.code[i]), words))
 
 
+def _named(block: Block, rows: IntArray, names: frozenset[str]) -> Iterator[Command]:
+    """Commands of the block that have one of these names, with their words NAME=number."""
+    for line, text in block.named:
+        name, *words = text.decode("utf-8", "replace").upper().split()
+        if name in names:
+            row = int(rows[np.searchsorted(block.line, line)])
+            yield Command(line, row, name, -1, tuple(_values(words)))
+
+
+def _values(words: list[str]) -> Iterator[tuple[str, float]]:
+    for word in words:
+        key, equals, value = word.partition("=")
+        try:
+            yield key, float(value) if equals else math.nan
+        except ValueError:
+            yield key, math.nan
+
+
 def code_name(letter: str, code: int) -> str:
     """('G', 434) as G43.4."""
+    if code < 0:
+        return letter
     whole, tenth = divmod(code, 10)
     return f"{letter}{whole}.{tenth}" if tenth else f"{letter}{whole}"

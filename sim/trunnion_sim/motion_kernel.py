@@ -6,7 +6,6 @@ linear joints, filament and feed.
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,9 +50,9 @@ class Rows(NamedTuple):
     filament: NDArray[np.float64]
     feed: NDArray[np.float64]
     flags: NDArray[np.uint8]
-    homed: NDArray[np.int64]
+    homed: NDArray[np.uint8]
     dwell: NDArray[np.float64]
-    bytes: NDArray[np.int64]
+    bytes: NDArray[np.int32]
 
 
 def fresh_rows(n: int, k: int) -> Rows:
@@ -65,24 +64,9 @@ def fresh_rows(n: int, k: int) -> Rows:
         np.zeros(n),
         np.zeros(n),
         np.zeros(n, np.uint8),
-        np.zeros(n, np.int64),
+        np.zeros(n, np.uint8),
         np.zeros(n),
-        np.zeros(n, np.int64),
-    )
-
-
-def joined(parts: Sequence[Rows], each: int | None = None) -> Rows:
-    """Rows after each other, copied; of each part only the first `each`, if given."""
-    return Rows(
-        np.concatenate([part.line[:each] for part in parts]),
-        np.concatenate([part.kind[:each] for part in parts]),
-        np.concatenate([part.joints[:each] for part in parts]),
-        np.concatenate([part.filament[:each] for part in parts]),
-        np.concatenate([part.feed[:each] for part in parts]),
-        np.concatenate([part.flags[:each] for part in parts]),
-        np.concatenate([part.homed[:each] for part in parts]),
-        np.concatenate([part.dwell[:each] for part in parts]),
-        np.concatenate([part.bytes[:each] for part in parts]),
+        np.zeros(n, np.int32),
     )
 
 

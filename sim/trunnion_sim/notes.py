@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.roles import Role
@@ -16,6 +17,7 @@ from trunnion_sim.reader import Block
 
 OTHER = -1
 """A role that the comments name and this project has not, such as support; or none named at all."""
+LAST_LAYER = 1_000_000_000
 HEADER_KEYS = 2000
 """`; key = value` comments kept at most."""
 
@@ -91,18 +93,35 @@ class Notes:
 
 @dataclass(frozen=True, eq=False)
 class RowNotes:
-    """What the comments say, row by row; NaN, OTHER or -1 where they are silent."""
+    """What the comments say, row by row; NaN, OTHER or -1 where they are silent.
 
-    role: IntArray
+    Width, height and speed are looked up when asked for: a long program keeps no array for what seldom changes.
+    """
+
+    role: NDArray[np.int8]
     """(n,) of `Role`, or OTHER."""
-    width: FloatArray
-    height: FloatArray
-    speed: FloatArray
-    """(n,) mm/s wanted of the tip."""
-    layer: IntArray
+    layer: NDArray[np.int32]
     """(n,) from 0; -1 before the first layer."""
     own_roles: bool
     """Whether the program names the role of every row itself (`;ROLE:`), travels included."""
+    notes: Notes
+    lines: IntArray
+    """(n,) of the file."""
+
+    @property
+    def width(self) -> FloatArray:
+        """(n,) mm."""
+        return self.notes.of_lines("width", self.lines, np.nan)
+
+    @property
+    def height(self) -> FloatArray:
+        """(n,) mm."""
+        return self.notes.of_lines("height", self.lines, np.nan)
+
+    @property
+    def speed(self) -> FloatArray:
+        """(n,) mm/s wanted of the tip."""
+        return self.notes.of_lines("speed", self.lines, np.nan)
 
     @property
     def bead(self) -> BoolArray:
@@ -114,12 +133,11 @@ def row_notes(notes: Notes, lines: IntArray) -> RowNotes:
     """Answers for the rows of a motion, given their lines."""
     own = notes.says("role")
     return RowNotes(
-        role=notes.of_lines("role" if own else "type", lines, OTHER).astype(np.int64),
-        width=notes.of_lines("width", lines, np.nan),
-        height=notes.of_lines("height", lines, np.nan),
-        speed=notes.of_lines("speed", lines, np.nan),
-        layer=notes.of_lines("layer", lines, -1.0).astype(np.int64),
+        role=notes.of_lines("role" if own else "type", lines, OTHER).astype(np.int8),
+        layer=np.clip(notes.of_lines("layer", lines, -1.0), -1, LAST_LAYER).astype(np.int32),
         own_roles=own,
+        notes=notes,
+        lines=lines,
     )
 
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from trunnion_core.arrays import FloatArray, IntArray
+from trunnion_core.arrays import FloatArray
 from trunnion_core.findings import Finding
 from trunnion_core.trace import Trace
 
@@ -71,7 +72,7 @@ class Report:
     """Percentiles over the time of printing of tip speed over wanted speed; None where the program names no speed."""
     flow: dict[str, float]
     """mm³/s while printing: median over time, highest."""
-    role: IntArray
+    role: NDArray[np.int8]
     """(n,) of every row of the trace: a `Role`, or -1 where the program names none."""
     width: FloatArray
     """(n,) mm of the bead that the row lays, 0 where it lays none."""

@@ -29,7 +29,8 @@ def judged(folder: Path, profile: MachineProfile, program: list[str]) -> Context
 
 def test_a_long_turn_keeps_the_tip_on_its_line(profile: MachineProfile, tmp_path: Path) -> None:
     context = judged(tmp_path, profile, PROGRAM)
-    rows, points, _ = context.inside
+    (stretch,) = context.stretches()
+    rows, points = stretch.rows, stretch.points
     line = context.motion.line[rows]
     begin, end = np.array([20.0, 10.0, 30.0]), np.array([-20.0, 15.0, 12.0])
     long = points[line == 5]

@@ -22,11 +22,10 @@ EDGE_SLACK = 0.01
 
 def check(context: Context) -> Iterator[Finding]:
     """Look along every motion, arcs that rotary joints draw included."""
-    rows, points, _ = context.inside
-    n = len(context.motion)
-    over = on_bed(context.profile.bed, points[:, :2])
-    lowest = np.full(n, np.inf)
-    np.minimum.at(lowest, rows[over], points[over, 2])
+    lowest = np.full(len(context.motion), np.inf)
+    for stretch in context.stretches():
+        over = on_bed(context.profile.bed, stretch.points[:, :2])
+        np.minimum.at(lowest, stretch.rows[over], stretch.points[over, 2])
     known = ~context.homing & (context.homed | ~context.homing.any())
     yield from context.find(
         "nozzle-below-bed",

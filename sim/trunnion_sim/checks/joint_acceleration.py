@@ -28,11 +28,10 @@ SLACK = 0.01
 def check(context: Context) -> Iterator[Finding]:
     """Acceleration inside moves as replayed, and the corner speeds that the program sets."""
     replay, profile = context.replay, context.profile
-    length = np.where(replay.length > 0, replay.length, np.inf)[:, None]
-    ratio = (context.motion.joints - context.motion.before) / length
+    length = np.where(replay.length > 0, replay.length, np.inf)
     changes = (replay.cruise > replay.entry + 1e-9) | (replay.cruise > replay.exit + 1e-9)
     for k, joint in enumerate(profile.joints):
-        hard = np.abs(ratio[:, k]) * replay.acceleration
+        hard = np.abs(np.diff(context.motion.path[:, k])) / length * replay.acceleration
         over = (hard > joint.acceleration * (1 + SLACK)) & changes & ~context.homing
         yield from context.find(
             "joint-acceleration",

@@ -30,10 +30,9 @@ def check(context: Context) -> Iterator[Finding]:
     """Speed of every joint as F asks for it, and as the firmware would drive it."""
     replay = context.replay
     length = np.where(replay.length > 0, replay.length, np.inf)
-    way = np.abs(context.motion.joints - context.motion.before)
     for k, joint in enumerate(context.profile.joints):
-        asked = way[:, k] / length * replay.asked
-        driven = way[:, k] / length * replay.cruise
+        per_length = np.abs(np.diff(context.motion.path[:, k])) / length
+        asked, driven = per_length * replay.asked, per_length * replay.cruise
         limit = joint.speed * (1 + SPEED_SLACK)
         over = (asked > limit) & ~context.homing
         serious = (over & (context.feeds | joint.rotary)) | ((driven > limit) & ~context.homing)
