@@ -58,8 +58,9 @@ def context_of(program: Path, profile: MachineProfile) -> Context:
         raise GcodeError(f"{program}: {reader.end.lines} lines hold no command, should be a G-code program")
     if not motion.code_count:
         raise GcodeError(f"{program}: no line holds a G, M or T command, should be a G-code program")
-    tips, axes = forward(profile, motion.path)
     limits = limits_of(motion, profile, rules.slowest)
+    replayed = replay(motion, profile, rules, limits)  # needs the most memory on its way, so it comes first
+    tips, axes = forward(profile, motion.path)
     return Context(
         profile=profile,
         rules=rules,
@@ -67,7 +68,7 @@ def context_of(program: Path, profile: MachineProfile) -> Context:
         notes=notes,
         rows=row_notes(notes, motion.line),
         limits=limits,
-        replay=replay(motion, profile, rules, limits),
+        replay=replayed,
         tips=tips,
         axes=axes,
         oddities=oddities.result(),
