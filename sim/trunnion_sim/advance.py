@@ -1,10 +1,10 @@
 """What the extruder pushes at any instant: the filament of the row in step with its speed, and pressure advance.
 
-Marlin's LIN_ADVANCE (`module/planner.cpp`, `stepper.cpp`) and RepRapFirmware's M572 both add K times the change of
-the filament's speed, in rows that feed while a linear joint moves. K is what the program says (M900 K, M572 S); a
-program that is silent about it leaves the firmware's own setting, which nobody here knows, and none is counted. Where
-the filament's speed jumps, at corners and where feeding begins at speed, the firmware catches up within its own limits;
-such a jump has no duration here and no flow.
+Marlin's LIN_ADVANCE (`module/planner.cpp`, `stepper.cpp`), RepRapFirmware's M572 (`Movement/DDA.cpp`) and Klipper's
+SET_PRESSURE_ADVANCE (`klippy/kinematics/extruder.py`) add K times the change of the filament's speed, in rows that feed
+while certain axes move (`Rules`). K is what the program says; a program that is silent about it leaves the firmware's
+own setting, which nobody here knows, and none is counted. Where the filament's speed jumps, at corners and where
+feeding begins at speed, the firmware catches up within its own limits; such a jump has no duration here and no flow.
 """
 
 import numpy as np
@@ -13,11 +13,13 @@ from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
 from trunnion_sim.motion import Motion
 from trunnion_sim.replay import Replay
+from trunnion_sim.rules import Rules
 
-COMMANDS = {"M900": "K", "M572": "S"}
+COMMANDS = {"M900": "K", "M572": "S", "SET_PRESSURE_ADVANCE": "ADVANCE"}
+"""Commands that set the firmware's advance, and the word with the seconds."""
 
 
-def flow(replay: Replay, motion: Motion, profile: MachineProfile, times: FloatArray) -> FloatArray:
+def pushed(replay: Replay, motion: Motion, profile: MachineProfile, rules: Rules, times: FloatArray) -> FloatArray:
     """(m,) mm³/s that the extruder's motor moves at `times` (m,) s; negative where it is drawn back, 0 at rest.
 
     With pressure advance it runs ahead of what leaves the nozzle: more while the tip speeds up, less while it brakes.
@@ -31,17 +33,23 @@ def flow(replay: Replay, motion: Motion, profile: MachineProfile, times: FloatAr
     length = replay.length[row]
     ratio = np.divide(motion.filament[row], length, out=np.zeros(len(row)), where=length > 0)
     moving = speed > 0
-    ahead = advance(motion, profile)[row] * change
+    ahead = own_advance(motion, profile, rules)[row] * change
     return np.asarray(np.where(moving, ratio * (speed + ahead), 0.0) * profile.filament_area)
 
 
-def advance(motion: Motion, profile: MachineProfile) -> FloatArray:
-    """(n,) s of pressure advance that applies to every row; 0 where the firmware applies none."""
+def own_advance(motion: Motion, profile: MachineProfile, rules: Rules) -> FloatArray:
+    """(n,) s of the firmware's own advance on every row; 0 where it applies none, or the program sets none."""
+    seen = [column for column, joint in enumerate(profile.joints) if joint.letter in rules.advance_axes]
+    way = np.linalg.norm((motion.joints - motion.before)[:, seen], axis=1)
+    little = motion.filament <= rules.advance_ratio * np.where(way > 0, way, 1.0)
+    return np.where((motion.filament > 0) & (way > 0) & little, commanded(motion), 0.0)
+
+
+def commanded(motion: Motion) -> FloatArray:
+    """(n,) s that the commands in force say; 0 before any."""
     seconds = np.zeros(len(motion))
     for command in motion.commands:
         value = command.get(COMMANDS[command.name]) if command.name in COMMANDS else None
-        if value is not None and value >= 0:
+        if value is not None and 0 <= value < np.inf:
             seconds[command.row :] = value
-    linear = [column for column, joint in enumerate(profile.joints) if not joint.rotary]
-    moves = (np.abs(motion.joints - motion.before)[:, linear] > 0).any(axis=1)
-    return np.where(moves & (motion.filament > 0), seconds, 0.0)
+    return seconds

@@ -21,6 +21,8 @@ CHUNK = 1 << 20
 """Bytes read at a time."""
 LONGEST_LINE = 1 << 16
 """Bytes after which a line is no longer taken for G-code and skipped to its end."""
+MOST_NAMED = 1000
+"""Commands with names, of one piece, whose text is kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,8 @@ class Block:
     """NaN where a letter has no number."""
     comments: tuple[tuple[int, bytes], ...]
     """Line and text after the semicolon of comments that say something: `;KEY...`, `; key = value`."""
+    named: tuple[tuple[int, bytes], ...] = ()
+    """Line and text of commands that have a name instead of a number: SET_PRESSURE_ADVANCE ADVANCE=0.05."""
 
 
 @dataclass(frozen=True)
@@ -148,8 +152,17 @@ def _parse(data: bytes, first_line: int) -> tuple[Block, int]:
         word_letter=word_letter[:w].copy(),
         word_value=word_value[:w].copy(),
         comments=tuple((int(at), data[start:stop]) for at, start, stop in comment[:c].tolist()),
+        named=_named(data, first_line, line[:m][(flags[:m] & kernel.NAMED) > 0][:MOST_NAMED]),
     )
     return block, n
+
+
+def _named(data: bytes, first_line: int, lines: IntArray) -> tuple[tuple[int, bytes], ...]:
+    """Those lines and what stands in them before a semicolon."""
+    if not len(lines):
+        return ()
+    text = data.split(b"\n")
+    return tuple((line, text[line - first_line].partition(b";")[0].strip()) for line in lines.tolist())
 
 
 def _overlong(line: int, length: int) -> Block:

@@ -4,8 +4,9 @@ A firmware is a file in `firmwares/` that exposes RULES; the profile's `firmware
 """
 
 import importlib
+import math
 import pkgutil
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from trunnion_core.errors import ProfileError
@@ -20,6 +21,8 @@ class Rules:
     name: str
     commands: frozenset[tuple[str, int]]
     """Letter and ten times the number of every command it knows."""
+    names: frozenset[str] = field(default=frozenset(), kw_only=True)
+    """Commands that have a name instead of a number, as far as the judge knows them."""
     corners: Literal["marlin", "per_axis", "klipper", "grbl", "linuxcnc"]
     """How the speed at a corner comes about: see `replay_kernel` and `toolhead_kernel`."""
     g90_resets_e: bool
@@ -44,6 +47,12 @@ class Rules:
     """Letter of the filament."""
     tip_words: Literal["never", "G43.4", "always"] = "never"
     """When X, Y and Z are the tip over the part, as with the rotaries at zero, instead of joints."""
+    advance_axes: str = ""
+    """Letters of the joints of which one has to move for the firmware's own pressure advance; empty if it has none."""
+    advance_ratio: float = math.inf
+    """mm of filament to a mm over those joints beyond which it applies none."""
+    advance: Literal["at once", "held", "ramps"] = "at once"
+    """What its advance does between moves: see `pressure_kernel`."""
 
 
 def find_rules(name: str, source: str = "profile") -> Rules:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trunnion_core.profile import load_profile
-from trunnion_sim.advance import advance, flow
+from trunnion_sim.advance import own_advance, pushed
 from trunnion_sim.judge import context_of
 
 PROFILE = load_profile("generic_ab_cradle")
@@ -30,7 +30,8 @@ def rates(folder: Path, program: list[str], row: int) -> tuple[np.ndarray, np.nd
     context = context_of(file, PROFILE)
     begin, duration = context.replay.begin[row], context.replay.duration[row]
     times = begin + (np.arange(20000) + 0.5) / 20000 * duration
-    return times, flow(context.replay, context.motion, PROFILE, times), advance(context.motion, PROFILE)
+    pushes = pushed(context.replay, context.motion, PROFILE, context.rules, times)
+    return times, pushes, own_advance(context.motion, PROFILE, context.rules)
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.05])

@@ -61,7 +61,7 @@ def check(context: Context) -> Iterator[Finding]:
         value=span,
         limit=BRIDGE,
     )
-    volume = context.motion.filament * context.profile.filament_area
+    volume = context.laid * context.profile.filament_area
     share = np.divide(deposit.crowded, volume, out=np.zeros(len(volume)), where=context.feeds & (deposit.laid > 0))
     share = np.where(meant, np.maximum(share, deposit.taken), 0.0)
     double = _run_length(share > OVER, deposit.laid) > LONGEST_DOUBLE

@@ -49,7 +49,7 @@ def check(context: Context) -> Iterator[Finding]:
     )
     if not context.rows.own_roles:
         return
-    dry = context.rows.bead & context.moved & ~context.homing & (motion.filament <= 0)
+    dry = context.rows.bead & context.moved & ~context.homing & (context.laid <= 0)
     yield from context.find(
         "bead-without-plastic",
         "error",

@@ -27,8 +27,8 @@ LEAST = 0.05
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """Section from filament over tip travel against the comments' width and height; volume over time."""
-    volume = context.motion.filament * context.profile.filament_area
+    """Section from what leaves the nozzle over tip travel against the comments' width and height; volume over time."""
+    volume = context.laid * context.profile.filament_area
     rows = context.feeds & (context.tip_length > LEAST)
     section = np.divide(volume, context.tip_length, out=np.zeros(len(volume)), where=rows)
     width, height = context.rows.width, context.rows.height

@@ -88,7 +88,8 @@ def _commands(context: Context) -> Iterator[Finding]:
         text = f"{name} is unknown to {context.rules.name}{more}" + (f", {hint}" if hint.startswith("did") else "")
         yield Finding("unknown-command", "error", text, line=line, count=count)
     flags, lines = context.oddities.flags, context.oddities.lines
-    strange = (flags & reading.NAMED) > 0
+    named = [command.line for command in context.motion.commands if command.code < 0]
+    strange = ((flags & reading.NAMED) > 0) & ~np.isin(lines, named)
     if context.rules.case_sensitive:
         strange |= (flags & reading.LOWER) > 0
     yield from _each("unknown-command", lines[strange].tolist(), f"is no command that {context.rules.name} knows")

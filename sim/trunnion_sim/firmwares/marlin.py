@@ -24,4 +24,7 @@ RULES = Rules(
     starts_at_corner_speed=True,
     whole_steps=True,
     shortest_linear=1e-3,
+    advance_axes="XYZ",
+    advance_ratio=3.0,
+    advance="held",
 )

@@ -18,4 +18,6 @@ RULES = Rules(
     least_blocks=40,
     slowest=0.5,
     starts_at_corner_speed=False,
+    advance_axes="XY",
+    advance="ramps",
 )
