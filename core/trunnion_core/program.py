@@ -52,6 +52,8 @@ class MachineProgram:
     tip: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     """(n + 1, 3) mm, `part`: the tip at `start` and at the end of every row, for firmware that is told tips instead of
     joints. Empty where nobody worked it out."""
+    advance: float = 0.0
+    """s of pressure advance that `filament` carries itself; 0 where it is left to the firmware, or there is none."""
 
     def __post_init__(self) -> None:
         n, k = self.joints.shape
@@ -74,6 +76,8 @@ class MachineProgram:
             check_array("cruise", self.cruise, (n,))
         if self.tip.size:
             check_array("tip", self.tip, (n + 1, 3))
+        if not self.advance >= 0:
+            raise ValueError(f"advance: is {self.advance}, should be 0 or more seconds")
         if n and self.duration.min() < 0:
             raise ValueError(f"duration: row {int(self.duration.argmin())} is negative")
         freeze(self.joints, self.start, self.cruise, self.tip, *(getattr(self, name) for name in per_row))

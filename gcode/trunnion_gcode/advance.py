@@ -1,13 +1,18 @@
-"""The profile's pressure advance becomes the firmware's own command, where the firmware applies it to every bead.
+"""Who carries the profile's pressure advance: the firmware, by its own command, or the filament words themselves.
 
-Firmwares drive pressure advance from the whole extruder's motion, which is right on five axes too, but only in moves
-of some linear axis: Klipper (`klippy/kinematics/extruder.py` move) and RepRapFirmware (`DDA::InitStandardMove`) want X
-or Y, Marlin (`Planner::_populate_block`, LIN_ADVANCE) X, Y or Z, since it divides by their distance. A bead laid by
-rotary joints alone would get none, and the pressure would jump where it begins and ends.
+A firmware drives pressure advance from the whole extruder's motion, which is right on five axes too, but leaves it out
+of some moves: Klipper (`klippy/kinematics/extruder.py` check and move) and RepRapFirmware 3.6 (`DDA::InitStandardMove`,
+`isPrintingMove`) where X and Y stand still, Marlin (`Planner::_populate_block`, LIN_ADVANCE) where X, Y and Z do and
+where more than 3 mm of filament go with a millimetre of them, as on a table that turns under a nozzle that hardly
+moves. LinuxCNC and grblHAL have none. Where more than OVERLOOKED of the plastic would go without, the firmware's own
+is turned off for the whole program and the words carry all of it (`MachineProgram.advance`): beside a bead with the
+firmware's advance, one with its own in the words would get the step of pressure between them twice or not at all,
+for each firmware in another way.
 """
 
 import numpy as np
 
+from trunnion_core.arrays import BoolArray
 from trunnion_core.errors import GcodeError
 from trunnion_core.profile import MachineProfile
 from trunnion_gcode.dialect import Dialect
@@ -16,29 +21,49 @@ from trunnion_gcode.words import number
 
 OVERLOOKED = 0.005
 """Share of the plastic that may be laid in moves to which the firmware does not apply its pressure advance."""
+PLASTIC = "; plastic advance [s] = %s"
+"""Tells readers how far the filament's drive has to run ahead of the nozzle, whoever sees to it."""
 
 
-def advance_lines(moves: Moves, profile: MachineProfile, dialect: Dialect) -> list[str]:
-    """The command that turns pressure advance on, if the profile has any.
+def words_carry_advance(moves: Moves, profile: MachineProfile, dialect: Dialect) -> bool:
+    """Whether the filament words have to carry pressure advance, since the firmware would not apply it here."""
+    return profile.extruder.pressure_advance > 0 and overlooked(moves, profile, dialect) > OVERLOOKED
 
-    GcodeError where the firmware has no such command, or where it would leave more than OVERLOOKED of the plastic
-    without it because the axes that it looks at stand still.
+
+def overlooked(moves: Moves, profile: MachineProfile, dialect: Dialect) -> float:
+    """Share of the plastic, 0 to 1, in moves to which the firmware does not apply its own pressure advance."""
+    laid = np.where((moves.width > 0) & (moves.filament > 0), moves.filament, 0.0)
+    total = float(laid.sum())
+    return float(laid[_left_out(moves, profile, dialect)].sum()) / total if total > 0 else 0.0
+
+
+def advance_lines(carried: float, moves: Moves, profile: MachineProfile, dialect: Dialect) -> list[str]:
+    """What the program says about pressure advance before its first move; nothing where the profile has none.
+
+    `carried` s are in the filament words already (`MachineProgram.advance`), and the firmware's own is turned off.
+    Else it is turned on; GcodeError where the firmware would leave more than OVERLOOKED of the plastic without it.
     """
     seconds = profile.extruder.pressure_advance
+    if carried > 0:
+        off = [] if dialect.pressure_advance is None else [dialect.pressure_advance % "0"]
+        return [PLASTIC % number("pressure advance", carried, 4), "; the filament words carry it", *off]
     if seconds <= 0:
         return []
+    if words_carry_advance(moves, profile, dialect):
+        share = 100 * overlooked(moves, profile, dialect)
+        raise GcodeError(
+            f"{profile.file}: extruder.pressure_advance is {seconds:g} s, but {dialect.name} applies none to "
+            f"{share:.1f} % of the plastic, and the program's filament does not carry it; plan the program for this "
+            "firmware, or set it to 0"
+        )
+    text = number("pressure advance", seconds, 4)
+    return [PLASTIC % text, *([] if dialect.pressure_advance is None else [dialect.pressure_advance % text])]
+
+
+def _left_out(moves: Moves, profile: MachineProfile, dialect: Dialect) -> BoolArray:
+    """(m,) moves to which the firmware applies no advance of its own."""
     if dialect.pressure_advance is None:
-        raise GcodeError(
-            f"{profile.file}: extruder.pressure_advance is {seconds:g} s, but {dialect.name} has no pressure advance; "
-            "it should be 0"
-        )
+        return np.ones(len(moves.row), dtype=np.bool_)
     seen = [column for column, joint in enumerate(profile.joints) if joint.letter in dialect.advance_axes]
-    laid = np.where(moves.width > 0, moves.filament, 0.0)
-    still = laid[(moves.step[:, seen] == 0).all(axis=1)].sum()
-    if still > OVERLOOKED * laid.sum():
-        raise GcodeError(
-            f"{profile.file}: extruder.pressure_advance is {seconds:g} s, but {100 * still / laid.sum():.1f} % of the "
-            f"plastic is laid while {' and '.join(dialect.advance_axes)} stand still, where {dialect.name} leaves "
-            "pressure advance out; it should be 0 for this print"
-        )
-    return [dialect.pressure_advance % number("pressure advance", seconds, 4)]
+    way = np.linalg.norm(moves.word_step[:, seen], axis=1)
+    return np.asarray((way == 0) | (moves.filament / np.where(way > 0, way, 1.0) > dialect.advance_ratio))

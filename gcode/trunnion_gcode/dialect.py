@@ -4,6 +4,7 @@ A dialect is a file in `dialects/` that exposes DIALECT; the profile's `firmware
 """
 
 import importlib
+import math
 import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -56,9 +57,13 @@ class Dialect:
     fan_full: int = 255
     pause: str = "M0"
     pressure_advance: str | None = None
-    """Turns pressure advance on; takes s."""
+    """Turns pressure advance on; takes s, 0 for off."""
     advance_axes: str = "XY"
-    """Letters of the joints of which one has to move for the firmware to apply it."""
+    """Letters of the words of which one has to change for the firmware to apply it."""
+    advance_ratio: float = math.inf
+    """mm of filament to a mm over those axes beyond which it does not."""
+    draws_back: bool = True
+    """Whether a move of joints may draw filament back without the planner stopping before and after."""
     progress: str | None = "M73 P%d R%d"
     """Takes percent done and minutes left."""
     checksums: bool = True

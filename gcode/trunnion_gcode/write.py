@@ -91,7 +91,7 @@ def program_lines(
         *(text for waits, text in heat if not waits),
         *filled(profile.gcode.start, f"{profile.file}: gcode.start", values),
         *(text for waits, text in heat if waits),
-        *advance_lines(moves, profile, dialect),
+        *advance_lines(program.advance, moves, profile, dialect),
         *dialect.enter,
         *_body(program, moves, profile, settings, dialect, layer_z),
         *dialect.leave,

@@ -2,7 +2,8 @@
 
 One continuous way through the joint solutions is chosen, rows are subdivided so that the tip stays on its chords,
 hops lead over the part where the machine must turn, filament follows from the path in the part, retractions bracket the
-travels, and the time law gives every row what the slowest joint allows.
+travels, and the time law gives every row what the slowest joint allows. Where the firmware has no pressure advance for
+such motion, the filament carries it.
 """
 
 from dataclasses import dataclass, replace
@@ -17,9 +18,12 @@ from trunnion_core.program import MachineProgram
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
+from trunnion_gcode.advance import words_carry_advance
 from trunnion_gcode.dialect import find_dialect
+from trunnion_gcode.moves import make_moves
 from trunnion_kinematics.branches import PathChoice, choose
 from trunnion_kinematics.chain import JointChain
+from trunnion_motion.advance import with_advance
 from trunnion_motion.events import events_for
 from trunnion_motion.executed import executed
 from trunnion_motion.flow import filament_per_row, share
@@ -91,11 +95,19 @@ def plan_motion(toolpath: Toolpath, profile: MachineProfile, settings: PrintSett
         cruise=asked,
         tip=np.concatenate([home_tip, rows.points]),
     )
-    done = executed(program, ideal, profile, find_dialect(profile.firmware, profile.file))
+    dialect = find_dialect(profile.firmware, profile.file)
+    done = executed(program, ideal, profile, dialect)
+    points, axes, nominal = rows.points, rows.tool_axes, program.filament
+    if profile.extruder.pressure_advance > 0 and words_carry_advance(
+        make_moves(program, profile, dialect), profile, dialect
+    ):
+        advanced = with_advance(program, ideal, done, rows.tool_axes, profile, dialect)
+        program, done, nominal = advanced.program, advanced.execution, advanced.nominal
+        points, axes = advanced.tip_points, advanced.tool_axes
     law = done.law
     program = replace(program, duration=law.duration, cruise=done.asked)
-    findings = (*findings, *flow_findings(program, law, rows.points, profile))
-    return PlanResult(program, findings, rows.points, rows.tool_axes, law)
+    findings = (*findings, *flow_findings(replace(program, filament=nominal), law, points, profile))
+    return PlanResult(program, findings, points, axes, law)
 
 
 def _chosen(

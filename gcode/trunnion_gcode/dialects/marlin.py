@@ -22,4 +22,5 @@ DIALECT = Dialect(
     minimum_steps=6,
     pressure_advance="M900 K%s",
     advance_axes="XYZ",
+    advance_ratio=3.0,
 )

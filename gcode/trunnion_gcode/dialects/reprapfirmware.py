@@ -18,4 +18,5 @@ DIALECT = Dialect(
     minimum_speed=0.5,
     allow_slower="M203 I%s",
     pressure_advance="M572 D0 S%s",
+    draws_back=False,
 )
