@@ -8,9 +8,10 @@ from scipy.optimize import minimize
 from trunnion import samples
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
+from trunnion_slicer.nonplanar.fair import FAIRING, faired, refined
 from trunnion_slicer.nonplanar.plan import plan_nonplanar
 from trunnion_slicer.nonplanar.project import Lifted
-from trunnion_slicer.nonplanar.smooth import FAIRING, faired, refined, smoothed
+from trunnion_slicer.nonplanar.smooth import smoothed
 
 TOLERANCE = np.radians(2.0)
 
@@ -34,7 +35,7 @@ def between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def test_facets_within_the_cone_are_ironed_out() -> None:
     points, axes = faceted(200, 10, np.radians(2.0))
-    smooth = smoothed(points, axes, np.array([0, 200]), TOLERANCE)
+    smooth = smoothed(points, axes, axes, np.array([0, 200]), TOLERANCE)
     assert between(smooth, axes).max() <= 2.0 + 1e-9
     assert_allclose(np.linalg.norm(smooth, axis=1), 1.0, atol=1e-12)
     assert bending(points, smooth).max() < 0.02 * bending(points, axes).max()
@@ -42,7 +43,7 @@ def test_facets_within_the_cone_are_ironed_out() -> None:
 
 def test_no_other_axes_in_the_cones_bend_less() -> None:
     points, axes = faceted(36, 9, np.radians(6.0))
-    smooth = smoothed(points, axes, np.array([0, 36]), TOLERANCE)
+    smooth = smoothed(points, axes, axes, np.array([0, 36]), TOLERANCE)
     given = np.arctan2(axes[:, 0], axes[:, 2])
 
     def energy(angle: np.ndarray) -> float:
@@ -77,8 +78,10 @@ def test_corners_of_a_path_stay_corners() -> None:
 
 def test_paths_do_not_hear_each_other() -> None:
     points, axes = faceted(80, 10, np.radians(3.0))
-    alone = smoothed(points, axes, np.array([0, 80]), TOLERANCE)
-    twice = smoothed(np.tile(points, (2, 1)), np.concatenate([axes, axes[::-1]]), np.array([0, 80, 160]), TOLERANCE)
+    alone = smoothed(points, axes, axes, np.array([0, 80]), TOLERANCE)
+    twice = smoothed(
+        np.tile(points, (2, 1)), both := np.concatenate([axes, axes[::-1]]), both, np.array([0, 80, 160]), TOLERANCE
+    )
     assert_allclose(twice[:80], alone, atol=1e-9)
 
 
@@ -92,7 +95,7 @@ def test_a_closed_path_has_no_end(seam: int) -> None:
     points[-1] = points[0]
     axes = np.column_stack([np.sin(tilt) * np.cos(facets), np.sin(tilt) * np.sin(facets), np.full(121, np.cos(tilt))])
     axes[-1] = axes[0]
-    smooth = smoothed(points, axes, np.array([0, 121]), TOLERANCE)
+    smooth = smoothed(points, axes, axes, np.array([0, 121]), TOLERANCE)
     assert (smooth[0] == smooth[-1]).all()
     assert between(smooth, axes).max() <= 2.0 + 1e-9
     again = np.concatenate([smooth[-2:-1], smooth[:2]])
@@ -104,8 +107,8 @@ def test_a_closed_path_has_no_end(seam: int) -> None:
 
 def test_no_tolerance_leaves_axes_alone() -> None:
     points, axes = faceted(20, 5, np.radians(6.0))
-    assert smoothed(points, axes, np.array([0, 20]), 0.0) is axes
-    assert smoothed(points[:2], axes[:2], np.array([0, 2]), TOLERANCE) is not None
+    assert smoothed(points, axes, axes, np.array([0, 20]), 0.0) is axes
+    assert smoothed(points[:2], axes[:2], axes[:2], np.array([0, 2]), TOLERANCE) is not None
 
 
 def test_refined_paths_lay_the_same_at_the_same_places() -> None:

@@ -79,6 +79,8 @@ class Reach:
     region: BoolArray
     """(m,) reachable faces worth printing non-planar."""
     findings: tuple[Finding, ...]
+    scene: "Scene | None"
+    """What stands around the region, to try other poses in; None without bodies or a region."""
 
 
 def reachable(
@@ -94,13 +96,14 @@ def reachable(
     bodies = frusta(head)
     parent = np.arange(len(mesh.faces))
     if not len(bodies) or not region.any():
-        return Reach(mesh, parent, region, ())
+        return Reach(mesh, parent, region, (), None)
     before = footprints_of(mesh, region).sum()
+    scene = None
     lost = np.zeros(len(bodies))
     worst = np.full(len(bodies), np.inf)
     where = np.zeros((len(bodies), 3))
     for _ in range(ROUNDS):
-        scene = _Scene(mesh, region, settings, bodies, (layers - 1) * settings.layer_height)
+        scene = Scene(mesh, region, settings, bodies, (layers - 1) * settings.layer_height)
         mesh, region, parent = _split_mixed(scene, mesh, region, parent)
         clearance, body = _at_corners(scene, mesh, region)
         if clearance.min() >= -SLACK:
@@ -122,10 +125,10 @@ def reachable(
         _blocked(head[number].name, float(lost[number]), before, float(worst[number]), where[number])
         for number in np.flatnonzero(lost > 0).tolist()
     )
-    return Reach(mesh, parent, region, findings)
+    return Reach(mesh, parent, region, findings, scene)
 
 
-class _Scene:
+class Scene:
     """The part as it stands around a region, and the bodies that must not enter it."""
 
     def __init__(
@@ -162,28 +165,36 @@ class _Scene:
 
     def clearance(self, tips: FloatArray, axes: FloatArray, steps: FloatArray) -> tuple[FloatArray, IntArray]:
         """Least clearance (n,) and its body of the head on the skin (n, 3) and on the lowest layer under it."""
-        from trunnion_slicer.nonplanar.access_kernel import nearest
-
         least, body = np.full(len(tips), NEAR), np.full(len(tips), -1, np.int64)
         for depth in sorted({0.0, self.depth}):
-            gap, nearby, _ = nearest(
-                np.ascontiguousarray(tips + depth * steps),
-                np.ascontiguousarray(axes),
-                depth,
-                self.bodies,
-                SQUEEZE,
-                NEAR,
-                self.skin.points,
-                self.sinks,
-                self.margins,
-                self.skin.room_start,
-                self.skin.room_ball,
-                self.skin.cube_start,
-                self.skin.cube_ball,
-            )
+            gap, nearby = self.around(tips + depth * steps, axes, depth, NEAR)
             body = np.where(gap < least, nearby, body)
             least = np.minimum(gap, least)
         return least, body
+
+    def around(self, tips: FloatArray, axes: FloatArray, depth: float, far: float) -> tuple[FloatArray, IntArray]:
+        """Clearance (n,) and its body of the head at poses on the layer that lies `depth` mm under the skin.
+
+        Clearance beyond `far` mm is not looked for; there is no body then (-1).
+        """
+        from trunnion_slicer.nonplanar.access_kernel import nearest
+
+        gap, body, _ = nearest(
+            np.ascontiguousarray(tips),
+            np.ascontiguousarray(axes),
+            depth,
+            self.bodies,
+            SQUEEZE,
+            far,
+            self.skin.points,
+            self.sinks,
+            self.margins,
+            self.skin.room_start,
+            self.skin.room_ball,
+            self.skin.cube_start,
+            self.skin.cube_ball,
+        )
+        return gap, body
 
 
 def _poses(mesh: Mesh, region: BoolArray, *, upright: bool) -> tuple[FloatArray, FloatArray]:
@@ -198,7 +209,7 @@ def _poses(mesh: Mesh, region: BoolArray, *, upright: bool) -> tuple[FloatArray,
     return axes, steps
 
 
-def _at_corners(scene: _Scene, mesh: Mesh, region: BoolArray) -> tuple[FloatArray, IntArray]:
+def _at_corners(scene: Scene, mesh: Mesh, region: BoolArray) -> tuple[FloatArray, IntArray]:
     """Clearance and nearest body (m, 3) at the corners of the region's faces; NEAR and 0 elsewhere.
 
     A corner shared by faces that hold the tool differently (a crease) has the least clearance of them all.
@@ -234,7 +245,7 @@ def _tested_once(tips: FloatArray, axes: FloatArray) -> tuple[IntArray, IntArray
     return tested, same.ravel()
 
 
-def _split_mixed(scene: _Scene, mesh: Mesh, region: BoolArray, parent: IntArray) -> tuple[Mesh, BoolArray, IntArray]:
+def _split_mixed(scene: Scene, mesh: Mesh, region: BoolArray, parent: IntArray) -> tuple[Mesh, BoolArray, IntArray]:
     """Split faces that are reachable in one place and not in another, until their edges are at most FINE long."""
     axes, steps = _poses(mesh, region, upright=scene.upright)
     suspect = region.copy()
@@ -260,7 +271,7 @@ def _split_mixed(scene: _Scene, mesh: Mesh, region: BoolArray, parent: IntArray)
     return mesh, region, parent
 
 
-def _mixed(scene: _Scene, triangles: FloatArray, axes: FloatArray, steps: FloatArray) -> BoolArray:
+def _mixed(scene: Scene, triangles: FloatArray, axes: FloatArray, steps: FloatArray) -> BoolArray:
     """Which triangles (m, 3, 3) are reachable at some of the points spread over them and not at others."""
     points, owner = spread_points(triangles, FINE)
     weights = _weights(points, triangles[owner])

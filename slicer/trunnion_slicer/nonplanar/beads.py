@@ -10,13 +10,15 @@ from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.bead import bead_width
 from trunnion_core.layers import Bead, Layer
 from trunnion_core.settings import PrintSettings
+from trunnion_slicer.nonplanar.fair import faired, refined
+from trunnion_slicer.nonplanar.field import even_axes
 from trunnion_slicer.nonplanar.footprint import footprint
 from trunnion_slicer.nonplanar.grid import Grid, build_grid
 from trunnion_slicer.nonplanar.offset import Surfaces
 from trunnion_slicer.nonplanar.orient import corner_normals
 from trunnion_slicer.nonplanar.paths import FlatPath, flat_paths
 from trunnion_slicer.nonplanar.project import Lifted, lift
-from trunnion_slicer.nonplanar.smooth import faired, refined, smoothed
+from trunnion_slicer.nonplanar.smooth import into_cone, smoothed
 from trunnion_slicer.nonplanar.stairs import gap_over_stairs
 
 
@@ -58,7 +60,9 @@ def beads_of(on: Sheet, planar: Sequence[Layer], settings: PrintSettings) -> lis
     axes = lifted.axes
     if settings.nonplanar_smoothing > 0 and settings.nonplanar_tool_axis == "normal":
         lifted = refined(lifted)
-        axes = smoothed(lifted.points, lifted.axes, lifted.starts, float(np.radians(settings.nonplanar_smoothing)))
+        cone = float(np.radians(settings.nonplanar_smoothing))
+        wanted = into_cone(even_axes(lifted.points, on.grid, normals, cone), lifted.axes, cone)
+        axes = smoothed(lifted.points, lifted.axes, wanted, lifted.starts, cone)
         lifted = replace(lifted, points=faired(lifted.points, lifted.starts))
     height = _thickness(lifted) if lowest else np.full(len(axes), settings.layer_height)
     if settings.nonplanar_tool_axis == "vertical":
