@@ -77,6 +77,7 @@ def without(start: str) -> list[str]:
 
 MIDDLE = GOOD.index(";ROLE:travel", FIRST) - 1
 HANGING = [";ROLE:travel", "G0 X20 Y0 Z8 F2000", ";ROLE:solid_infill", f"G1 X28 {BEAD} F2400"]
+DROOPING = [";ROLE:travel", "G0 X20 Y0 Z8 F2000", ";ROLE:infill", f"G1 X23.5 E{PER_MM * 3.5:.5f} F2400"]
 TINY = [f"G1 X{8 + i * 0.03:.4f} Y7.7500 Z0.9000 A0.0000 B0.0000 E0.00126 F2400" for i in range(400)]
 
 MUTATIONS: dict[str, list[str]] = {
@@ -121,6 +122,7 @@ MUTATIONS: dict[str, list[str]] = {
     "wrong-filament": everywhere("filament_diameter = 1.75", "filament_diameter = 2.85"),
     "planner-starved": with_line(LAST + 1, *TINY),
     "bead-in-air": with_line(GOOD.index(";ROLE:retract"), *HANGING),
+    "hanging-infill": with_line(GOOD.index(";ROLE:retract"), *DROOPING),
     "long-bridge": with_line(
         GOOD.index(";ROLE:retract"),
         f"G1 X40 Z0.9 E{PER_MM * 38:.5f} F2400",

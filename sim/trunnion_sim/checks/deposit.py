@@ -7,11 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.bead import bead_area
 from trunnion_core.findings import Finding
+from trunnion_core.roles import Role
 from trunnion_sim.context import Context
 
 CODES = {
     "bead-in-air": ("error", "A whole bead has nothing below it and nothing beside it."),
+    "hanging-infill": ("warning", "A short piece of infill hangs in an opening of what is below; it droops."),
     "long-bridge": ("warning", "A long stretch of a bead hangs in the air."),
     "bead-over-bead": ("error", "A bead is laid where there is a bead already."),
     "crowded-bead": ("warning", "A bead has less than half the room that it was meant for."),
@@ -22,12 +25,15 @@ Floats = NDArray[np.floating[Any]]
 
 SHORTEST = 2.0
 """mm of bead that is worth a finding."""
+OPENING = 6.0
+"""mm across: openings of ordinary sparse infill, over which slicers start their solid layers."""
 BRIDGE = 20.0
 """mm that ordinary filament bridges with ease."""
 LONGEST_DOUBLE = 10.0
 """mm: seams, corners and the joints of infill along a wall overlap for shorter stretches in every slicer's programs."""
 OVER, CROWDED = 0.6, 0.5
-"""Share of a bead's plastic that finds no room, or of its place that is taken."""
+"""Share of a bead's plastic that finds no room, or of its place that is taken; of thin beads, which slicers lay on
+purpose where there is little room, the less the thinner they are."""
 DIP = 0.4
 """Of a layer height: how far a travel may dip into the round top of a bead that stands a little proud."""
 
@@ -43,10 +49,20 @@ def check(context: Context) -> Iterator[Finding]:
     hanging = _sum(bead, deposit.unsupported)
     whole = (hanging > 0.95 * laid) & (laid > SHORTEST)
     in_air = whole[bead] & meant & (deposit.laid > 0)
+    across = _across(context, bead, in_air)
+    inside = in_air & np.isin(context.rows.role, (Role.INFILL, Role.SOLID_INFILL)) & (across < OPENING)
+    yield from context.find(
+        "hanging-infill",
+        "warning",
+        inside,
+        lambda row: f"{laid[bead[row]]:.3g} mm of infill hang in an opening, {across[row]:.2g} mm across",
+        value=across,
+        limit=OPENING,
+    )
     yield from context.find(
         "bead-in-air",
         "error",
-        in_air,
+        in_air & ~inside,
         lambda row: f"a bead of {laid[bead[row]]:.3g} mm has nothing below it ({deposit.gap[row]:.2f} mm) or beside it",
         value=np.nan_to_num(deposit.gap),
         limit=context.layer_height,
@@ -63,7 +79,7 @@ def check(context: Context) -> Iterator[Finding]:
     )
     volume = context.laid * context.profile.filament_area
     share = np.divide(deposit.crowded, volume, out=np.zeros(len(volume)), where=context.feeds & (deposit.laid > 0))
-    share = np.where(meant, np.maximum(share, deposit.taken), 0.0)
+    share = np.where(meant, np.maximum(share, deposit.taken), 0.0) * _thickness(context, volume)
     double = _run_length(share > OVER, deposit.laid) > LONGEST_DOUBLE
 
     def message(row: int) -> str:
@@ -85,6 +101,25 @@ def check(context: Context) -> Iterator[Finding]:
         value=deposit.depth,
         limit=DIP * context.layer_height,
     )
+
+
+def _across(context: Context, bead: IntArray, rows: BoolArray) -> FloatArray:
+    """(n,) mm, diagonal in X and Y of everything that a row's bead lays; of `rows` (n,) only, infinite elsewhere."""
+    across = np.full(len(rows), np.inf)
+    which, group = np.unique(bead[rows], return_inverse=True)
+    low, high = np.full((len(which), 2), np.inf), np.full((len(which), 2), -np.inf)
+    for ends in (context.tips[:-1], context.tips[1:]):
+        np.minimum.at(low, group, ends[rows, :2])
+        np.maximum.at(high, group, ends[rows, :2])
+    across[rows] = np.linalg.norm(high - low, axis=1)[group]
+    return across
+
+
+def _thickness(context: Context, volume: FloatArray) -> FloatArray:
+    """(n,) section of each row's bead over that of the program's ordinary ones, at most 1."""
+    ordinary = bead_area(np.array(context.bead_width), np.array(context.layer_height))
+    whole = ordinary * context.tip_length
+    return np.asarray(np.clip(np.divide(volume, whole, out=np.ones(len(whole)), where=whole > 0), 0.0, 1.0))
 
 
 def _sum(group: IntArray, values: Floats) -> FloatArray:

@@ -27,14 +27,21 @@ SPEED_SLACK = 0.01
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """Speed of every joint as F asks for it, and as the firmware would drive it."""
+    """Speed of every joint as F asks for it, and as the firmware would drive it.
+
+    Where the linear joints move less than the firmware takes for motion, F is about the rotaries or the filament and
+    asks nothing of them.
+    """
     replay = context.replay
     length = np.where(replay.length > 0, replay.length, np.inf)
+    still = _linear_way(context) <= context.rules.shortest_linear
     for k, joint in enumerate(context.profile.joints):
         per_length = np.abs(np.diff(context.motion.path[:, k])) / length
         asked, driven = per_length * replay.asked, per_length * replay.cruise
         limit = joint.speed * (1 + SPEED_SLACK)
         over = (asked > limit) & ~context.homing
+        if not joint.rotary:
+            over &= ~still
         serious = (over & (context.feeds | joint.rotary)) | ((driven > limit) & ~context.homing)
         message = partial(_message, joint, asked)
         yield from context.find("joint-speed", "error", serious, message, value=asked, limit=joint.speed, joint=joint)
@@ -55,3 +62,12 @@ def _message(joint: Joint, asked: FloatArray, row: int) -> str:
         f"{joint.letter} is asked for {joint.shown(asked[row]):.4g} {joint.unit}/s, "
         f"it is rated for {joint.shown(joint.speed):g}"
     )
+
+
+def _linear_way(context: Context) -> FloatArray:
+    """(n,) mm that all linear joints move together."""
+    squared = np.zeros(len(context.motion))
+    for k, joint in enumerate(context.profile.joints):
+        if not joint.rotary:
+            squared += np.diff(context.motion.path[:, k]) ** 2
+    return np.sqrt(squared)
