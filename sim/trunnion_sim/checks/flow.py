@@ -4,10 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from trunnion_core.arrays import FloatArray
+from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.bead import bead_area
 from trunnion_core.findings import Finding
 from trunnion_sim.context import Context
+from trunnion_sim.pressure import phase_shares
 
 CODES = {
     "flow-off": ("warning", "Plastic per way differs from the planned bead's section by more than 15 %."),
@@ -34,13 +35,8 @@ def check(context: Context) -> Iterator[Finding]:
     width, height = context.rows.width, context.rows.height
     named = rows & np.isfinite(width) & np.isfinite(height) & (width > 0) & (height > 0) & context.rows.bead
     planned = np.where(named, bead_area(np.where(named, width, 1.0), np.where(named, height, 1.0)), 1.0)
-    short = context.tip_length < SMOOTH
-    laid = np.where(named, volume, 0.0)
-    meant = np.where(named, planned * context.tip_length, 0.0)
-    way = np.cumsum(np.where(named, context.tip_length, 0.0))
-    around = _around(meant, way)
-    together = np.divide(_around(laid, way), around, out=np.ones(len(volume)), where=named & (around > 0))
-    ratio = np.where(named, np.where(short, together, section / planned), 1.0)
+    ratio = _ratio(context, named, planned)
+    section = section if context.pressure is None else ratio * planned
     wrong = (ratio > WRONG) | (ratio < 1 / WRONG)
     off = (np.abs(ratio - 1) > OFF) & ~wrong
 
@@ -63,6 +59,27 @@ def check(context: Context) -> Iterator[Finding]:
         value=rate,
         limit=most,
     )
+
+
+def _ratio(context: Context, named: BoolArray, planned: FloatArray) -> FloatArray:
+    """(n,) section laid over section planned, of the `named` rows; 1 elsewhere.
+
+    Where pressure is known it differs within a row, which counts by its worst part: its ramps or what lies between.
+    """
+    if context.pressure is None:
+        parts, way = context.laid[:, None], context.tip_length[:, None]
+    else:
+        parts, way = context.pressure.phases, phase_shares(context.replay) * context.tip_length[:, None]
+    laid = np.where(named[:, None], parts * context.profile.filament_area, 0.0).ravel()
+    meant = np.where(named[:, None], planned[:, None] * way, 0.0).ravel()
+    length = np.where(named[:, None], way, 0.0).ravel()
+    ends = np.cumsum(length)
+    short = length < SMOOTH
+    laid, meant = np.where(short, _around(laid, ends), laid), np.where(short, _around(meant, ends), meant)
+    counts = (length > 0) & (meant > 0)
+    ratio = np.divide(laid, meant, out=np.ones(len(laid)), where=counts).reshape(way.shape)
+    worst = np.abs(np.log(np.maximum(ratio, 1e-9))).argmax(axis=1)
+    return np.asarray(np.take_along_axis(ratio, worst[:, None], axis=1)[:, 0])
 
 
 def _around(values: FloatArray, way: FloatArray) -> FloatArray:
