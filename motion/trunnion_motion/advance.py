@@ -165,31 +165,32 @@ def _cut(
 def _ahead(
     program: MachineProgram, nominal: FloatArray, law: TimeLaw, turning: BoolArray, seconds: float
 ) -> FloatArray:
-    """(n,) mm that the drive has to be ahead at the end of every row: K times what the beads take there a second.
+    """(n,) mm that the drive has to be ahead at the end of every row: K times what the bead takes there a second.
 
-    Between moves that stop at both ends, whatever they are, it is the pressure that such moves keep up at their ends
-    when each lays down what it is fed, K a K (1 - exp(-u / K)) (1 - exp(-(T - u) / K)) / (1 - exp(-T / K)) in filament:
-    u is the time of their ramps a, T that of all. Short beside K, that is K times their mean. At the ends of beads it
-    is what the prime before can bring or the retraction after take, else 0.
+    At the ends of moves that stop whatever they are, it is the pressure that such moves keep up when each lays down
+    what it is fed: a K² (1 - exp(-u / K)) (1 - exp(-(T - u) / K)) / (1 - exp(-T / K)) in filament, for ramps a of u s
+    in T s. Where they are short beside K, that is K times their mean. Where a bead begins or ends, the prime before or
+    the retraction after makes the step; without either the drive is not ahead there.
     """
     beads = (program.width > 0) & (nominal > 0)
     live = np.flatnonzero(~beads | (law.duration > 0))
-    bead, turning = beads[live], turning[live]
+    bead, ramp = beads[live], law.acceleration[live]
     alone = (program.role[live] == Role.RETRACT) | (program.role[live] == Role.PRIME)
     per_length = np.where(bead, nominal[live] / np.where(bead, law.length[live], 1.0), 0.0)
-    out, into = per_length * law.leave[live], per_length * law.entry[live]
-    whole, ramp = np.where(turning & bead, law.duration[live], 1.0), law.acceleration[live]
-    up = np.where(turning & bead, law.peak[live] / np.where(ramp > 0, ramp, 1.0), 0.0)
+    stops = turning[live] & bead
+    whole = np.where(stops, law.duration[live], 1.0)
+    up = np.where(stops, law.peak[live] / np.where(ramp > 0, ramp, 1.0), 0.0)
     kept = -np.expm1(-up / seconds) * np.expm1(-(whole - up) / seconds) / np.expm1(-whole / seconds)
-    kept = np.where(turning, per_length * ramp * seconds * kept, 0.0)
-    flow = np.where(turning[:-1] & turning[1:], 0.5 * (kept[:-1] + kept[1:]), 0.5 * (out[:-1] + into[1:]))
+    kept *= per_length * ramp * seconds
+    out = np.where(stops, kept, per_length * law.leave[live])[:-1]
+    into = np.where(stops, kept, per_length * law.entry[live])[1:]
     here, there = bead[:-1], bead[1:]
-    flow = np.where(
-        here & there, flow, np.where(here & alone[1:], out[:-1], np.where(alone[:-1] & there, into[1:], 0.0))
-    )
+    flow = np.where(here & there, 0.5 * (out + into), 0.0)
+    flow = np.where(here & alone[1:], out, np.where(alone[:-1] & there, into, flow))
     # Rows that take no time are not written: they keep what the row before them has.
     last = np.searchsorted(live, np.arange(len(program)), side="right") - 1
-    return np.asarray(seconds * np.append(flow, 0.0)[last])
+    ahead = seconds * np.append(flow, 0.0)
+    return np.asarray(np.where(last >= 0, ahead[last], 0.0))
 
 
 def _gradual(ahead: FloatArray, law: TimeLaw, speed: float) -> FloatArray:
