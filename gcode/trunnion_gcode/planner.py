@@ -21,6 +21,8 @@ class Planner:
     corners: Corners
     blocks: int | None = None
     """Moves that it looks ahead, at least; None where it sees all of them."""
+    unseen: int = 0
+    """Places of its queue that are empty when a move begins."""
     slowest: float = 0.0
     """Units/s; slower moves are sped up to this."""
     in_steps: bool = False

@@ -63,7 +63,7 @@ def executed(program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, d
         entry, peak, leave = kernel.smoothed_ramps(drive.length, nominal, drive.ramp, corner, stops, gentle)
     else:
         seen = dialect.planner.blocks
-        blocks = len(nominal) + 1 if seen is None else max(seen, profile.planner.blocks)
+        blocks = len(nominal) + 1 if seen is None else max(seen, profile.planner.blocks - dialect.planner.unseen)
         entry, peak, leave = kernel.ramps(drive.length, nominal, drive.ramp, corner, rest, stops, blocks)
     return _per_row(program, ideal, moves, _Trapezoids(entry, peak, leave, drive.ramp, asked))
 
@@ -148,7 +148,7 @@ class _Drive:
                 self.seen, nominal, self.length, self.ramp, self.acceleration, across, like_marlin
             )
             return corner, rest
-        return kernel.jerk_corners(self.seen, nominal, self.corner_speed)
+        return kernel.jerk_corners(self.seen, nominal, self.corner_speed), rest
 
 
 def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> _Drive:

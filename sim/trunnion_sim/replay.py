@@ -12,10 +12,15 @@ from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_sim import motion_kernel, replay_kernel, toolhead_kernel
 from trunnion_sim.limits import Limits
+from trunnion_sim.merging import blocks_of, laws_of_rows
 from trunnion_sim.motion import Motion
 from trunnion_sim.rules import Rules
 from trunnion_sim.tip_rows import world_steps
 
+STILL = 1e-9
+"""mm or degrees: smaller changes of joints are none."""
+MANY_STEPS = 1e6
+"""Per unit: of a joint without steps in the profile every motion counts."""
 GRBL_DEVIATION = 0.01
 """mm: grblHAL's own setting $11, where the profile gives no junction deviation."""
 NO_WORD = 1e-7
@@ -90,23 +95,36 @@ def replay(motion: Motion, profile: MachineProfile, rules: Rules, limits: Limits
         motion, profile, rules, limits, delta, homing, stops
     )
     before = np.where(np.isnan(motion.dwell), 0.0, motion.dwell)
+    before += _first_moves(length, stops, homing) * rules.first_move_delay
     begin = np.cumsum(before + duration) - duration
     return Replay(length, asked, entry, cruise, leave, acceleration, begin, duration)
 
 
-def _in_steps(delta: FloatArray, start: FloatArray, profile: MachineProfile) -> FloatArray:
+def _first_moves(length: FloatArray, stops: BoolArray, homing: BoolArray) -> BoolArray:
+    """(n,) rows that begin a run of fewer than three moves from one standstill to the next."""
+    run = np.cumsum(stops)
+    moving = (length > 0) & ~homing
+    count = np.bincount(run, weights=moving, minlength=1)
+    first = np.zeros(len(length), np.bool_)
+    rows = np.flatnonzero(moving)
+    first[rows[np.diff(run[rows], prepend=-1) > 0]] = True
+    return np.asarray(first & (count[run] < 3))
+
+
+def _steps_per_unit(profile: MachineProfile) -> FloatArray:
+    """(k + 1,) motor steps per mm and per degree, the filament last; inf where the profile gives none."""
+    joints = [joint.steps_per_unit / joint.shown(1.0) for joint in profile.joints]
+    given = np.array([*joints, profile.extruder.steps_per_mm])
+    return np.where(np.isfinite(given), given, np.inf)
+
+
+def _in_steps(delta: FloatArray, start: FloatArray, profile: MachineProfile, steps: FloatArray) -> FloatArray:
     """Changes of position between whole step counts of the motors; joints without steps in the profile stay."""
     seen = delta.copy()
     first = np.append(start * profile.to_shown, 0.0)
-    for column in range(delta.shape[1]):
-        if column < len(profile.joints):
-            joint = profile.joints[column]
-            steps = joint.steps_per_unit / joint.shown(1.0)
-        else:
-            steps = profile.extruder.steps_per_mm
-        if np.isfinite(steps):
-            counts = np.rint((first[column] + np.cumsum(delta[:, column])) * steps)
-            seen[:, column] = np.diff(counts, prepend=np.rint(first[column] * steps)) / steps
+    for column in np.flatnonzero(np.isfinite(steps)).tolist():
+        counts = np.rint((first[column] + np.cumsum(delta[:, column])) * steps[column])
+        seen[:, column] = np.diff(counts, prepend=np.rint(first[column] * steps[column])) / steps[column]
     return seen
 
 
@@ -187,29 +205,59 @@ def _marlin_or_duet(
     stops: BoolArray,
 ) -> toolhead_kernel.Law:
     deviation = profile.planner.junction_deviation
+    steps = _steps_per_unit(profile)
+    seen = _in_steps(delta, motion.start, profile, steps) if rules.least_steps else delta
+    named = _named(motion, profile, delta) if motion.of_tip.size else seen
+    rows = [delta, seen, named]
+    feed, inverse, which, counts, blocks = motion.feed, motion.inverse, limits.which, delta, None
+    if rules.least_steps:
+        counts = np.where(np.isfinite(steps), seen * np.where(np.isfinite(steps), steps, 0.0), delta * MANY_STEPS)
+        blocks = blocks_of(counts, homing, rules.least_steps - 0.5)
+    last_named = named
+    if blocks is not None and blocks.merged:
+        rows, counts = [blocks.sums(values) for values in rows], blocks.sums(counts)
+        last_named = named[blocks.last]
+        feed, inverse, which = feed[blocks.last], inverse[blocks.last], which[blocks.last]
+        homing, stops = blocks.any(homing), blocks.any(stops)
+    length = _metric(last_named if rules.tip_words == "G43.4" else rows[0], profile, rules.shortest_linear)
+    if blocks is not None:
+        few = (np.abs(counts[:, :-1]) < rules.least_steps - 0.5).all(axis=1)
+        length = np.where(few, np.abs(rows[0][:, -1]), length)
     law: toolhead_kernel.Law = replay_kernel.plan(
-        delta,
+        rows[0],
+        length,
         np.array([not joint.rotary for joint in profile.joints]),
-        motion.feed,
-        motion.inverse,
+        feed,
+        inverse,
         homing,
         stops,
-        limits.which,
+        which,
         limits.speed,
         limits.acceleration,
         limits.corner,
         limits.path,
         rules.corners == "per_axis",
         0.0 if deviation is None else deviation,
-        max(rules.least_blocks, profile.planner.blocks),
+        max(rules.least_blocks, profile.planner.blocks - rules.unseen_blocks),
         rules.slowest,
         limits.slowest,
-        rules.starts_at_corner_speed,
-        _tip_lengths(motion, profile),
-        _in_steps(delta, motion.start, profile) if rules.whole_steps else delta,
-        rules.shortest_linear,
+        rules.tip_words == "G43.4",
+        rows[1],
+        rows[2] if rules.tip_words == "never" else last_named,
     )
+    if blocks is not None and blocks.merged:
+        return laws_of_rows(law, blocks, _metric(delta, profile, 0.0))
     return law
+
+
+def _metric(delta: FloatArray, profile: MachineProfile, shortest: float) -> FloatArray:
+    """(n,) what F is read over: mm of linear joints where that is more than `shortest`, else degrees, else filament."""
+    moved = np.where(np.abs(delta) > STILL, delta, 0.0)
+    linear = np.array([not joint.rotary for joint in profile.joints])
+    straight = np.linalg.norm(moved[:, :-1][:, linear], axis=1)
+    turned = np.linalg.norm(moved[:, :-1][:, ~linear], axis=1)
+    rest = np.where(turned > 0, turned, np.abs(delta[:, -1]))
+    return np.asarray(np.where(straight > shortest, straight, rest))
 
 
 def _tip_steps(motion: Motion, profile: MachineProfile) -> FloatArray:
@@ -218,12 +266,14 @@ def _tip_steps(motion: Motion, profile: MachineProfile) -> FloatArray:
     return np.where(np.abs(steps) < NO_WORD, 0.0, steps)
 
 
-def _tip_lengths(motion: Motion, profile: MachineProfile) -> FloatArray:
-    """(n,) mm over which F is read where the row named the tip; -1 elsewhere."""
-    length = np.full(len(motion), -1.0)
-    if motion.of_tip.size:
-        length[motion.of_tip] = np.linalg.norm(_tip_steps(motion, profile), axis=1)[motion.of_tip]
-    return length
+def _named(motion: Motion, profile: MachineProfile, delta: FloatArray) -> FloatArray:
+    """(n, k + 1) what rows change in the words that they name: the tip instead of the linear joints."""
+    named = delta.copy()
+    steps = _tip_steps(motion, profile)
+    for place, letter in enumerate("XYZ"):
+        column = profile.letters.index(letter)
+        named[:, column] = np.where(motion.of_tip, steps[:, place], delta[:, column])
+    return named
 
 
 def samples(motion: Motion, rows: IntArray, fractions: FloatArray) -> FloatArray:

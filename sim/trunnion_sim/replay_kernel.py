@@ -5,8 +5,9 @@ r"""The planner of printer firmware as compiled loops: nominal speeds, corner sp
         entry /                \ exit    the area is the length of the block
               <---- duration --->
 
-Marlin: `module/planner.cpp` (2.1), `_populate_block`: the joints' speeds and accelerations scale the whole block; a
-corner is limited by classic jerk, or by junction deviation over all axes in mixed units. RepRapFirmware:
+Marlin: `module/planner.cpp` (2.1.2.5), `_populate_block`: the joints' speeds and accelerations scale the whole block; a
+corner is limited by classic jerk, or by junction deviation over all axes in mixed units, in kinematic builds by both. A
+move from a standstill begins from zero, since no pass looks at the first entry (`reverse_pass`). RepRapFirmware:
 `Movement/DDA.cpp`, `MatchSpeeds`: at a common speed no axis may jump by more than its instant speed change.
 """
 
@@ -26,6 +27,7 @@ LARGEST = 1e12
 @njit(cache=True)
 def plan(
     delta: _F,
+    length: _F,
     linear: NDArray[np.bool_],
     feed: _F,
     inverse: NDArray[np.bool_],
@@ -41,39 +43,34 @@ def plan(
     blocks: int,
     slowest: float,
     slowest_limit: _F,
-    starts_at_corner: bool,
-    tip_length: _F,
+    both_rules: bool,
     seen: _F,
-    shortest: float,
+    named: _F,
 ) -> tuple[_F, _F, _F, _F, _F, _F, _F]:
-    """Length, asked speed, entry, cruise, exit, acceleration and duration of every row."""
+    """Length, asked speed, entry, cruise, exit, acceleration and duration of every row.
+
+    `length` (n,) is what F is read over; `delta`, `seen` and `named` (n, k + 1) are what joints and filament change,
+    the same as the corners see it, and what the words change.
+    """
     n, columns = delta.shape
     k = columns - 1
-    length = np.zeros(n)
     asked = np.zeros(n)
     nominal = np.zeros(n)
     acceleration = np.ones(n)
     ratio = np.zeros((n, columns))
+    way = np.zeros((n, columns))
     kind = np.zeros(n, np.uint8)  # 1 joints move, 2 linear joints move, 4 filament moves
     for i in range(n):
-        straight = 0.0
-        turned = 0.0
+        moves = False
+        straight = False
         for j in range(k):
             if abs(delta[i, j]) > STILL:
-                if linear[j]:
-                    straight += delta[i, j] ** 2
-                else:
-                    turned += delta[i, j] ** 2
-        if tip_length[i] >= 0:
-            straight = tip_length[i] ** 2
-        if straight <= shortest * shortest:
-            straight = 0.0
-        d = math.sqrt(straight) if straight > 0 else (math.sqrt(turned) if turned > 0 else abs(delta[i, k]))
-        moves = straight > 0 or turned > 0
-        kind[i] = (1 if moves else 0) | (2 if straight > 0 else 0) | (4 if delta[i, k] != 0 else 0)
+                moves = True
+                straight = straight or linear[j]
+        kind[i] = (1 if moves else 0) | (2 if straight else 0) | (4 if delta[i, k] != 0 else 0)
+        d = length[i]
         if d <= 0:
             continue
-        length[i] = d
         lim = which[i]
         asked[i] = feed[i] * d if inverse[i] else feed[i]
         v = max(asked[i], slowest_limit[lim, 0])
@@ -82,6 +79,7 @@ def plan(
         for j in range(columns):
             r = delta[i, j] / d
             ratio[i, j] = seen[i, j] / d
+            way[i, j] = named[i, j] / d
             r = abs(r)
             if r > 0:
                 v = min(v, speed_limit[lim, j] / r)
@@ -89,8 +87,8 @@ def plan(
         nominal[i] = v
         acceleration[i] = a
     corner, start = _corners(
-        length, nominal, acceleration, ratio, kind, stops, which, corner_limit, acceleration_limit, per_axis, deviation,
-        slowest, starts_at_corner,
+        length, nominal, acceleration, ratio, way, kind, stops, which, corner_limit, acceleration_limit, per_axis,
+        deviation, slowest, both_rules,
     )  # fmt: skip
     entry, cruise, leave, duration = _trapezoids(length, nominal, acceleration, corner, start, stops, blocks)
     for i in range(n):
@@ -110,6 +108,7 @@ def _corners(
     nominal: _F,
     acceleration: _F,
     ratio: _F,
+    way: _F,
     kind: NDArray[np.uint8],
     stops: NDArray[np.bool_],
     which: NDArray[np.int64],
@@ -118,7 +117,7 @@ def _corners(
     per_axis: bool,
     deviation: float,
     slowest: float,
-    starts_at_corner: bool,
+    both_rules: bool,
 ) -> tuple[_F, _F]:
     """Squared speed allowed where a row begins, coming from the row before; and speed when it begins from rest."""
     n, columns = ratio.shape
@@ -131,14 +130,11 @@ def _corners(
             continue
         limit = corner_limit[which[i]]
         safe = nominal[i]
-        if starts_at_corner and deviation <= 0:
-            for j in range(columns):
-                r = abs(ratio[i, j])
-                if r * safe > limit[j]:
-                    safe = limit[j] / r
-        else:
-            safe = min(nominal[i], slowest) if not per_axis else 0.0
-        start[i] = safe
+        for j in range(columns):
+            r = abs(ratio[i, j])
+            if r * safe > limit[j]:
+                safe = limit[j] / r
+        start[i] = 0.0 if per_axis else min(nominal[i], slowest)
         if last >= 0 and not stops[i]:
             v = min(nominal[i], nominal[last])
             if per_axis:
@@ -148,17 +144,16 @@ def _corners(
                     jump = abs(ratio[i, j] - ratio[last, j])
                     if jump * v > limit[j]:
                         v = limit[j] / jump
-            elif deviation > 0:
-                v = min(
-                    v,
-                    _junction(
-                        length[i], acceleration_limit[which[i]], acceleration[i], ratio[last], ratio[i], deviation
-                    ),
-                )
             else:
-                v = _jerk(nominal[last], nominal[i], ratio[last], ratio[i], limit)
-                if last_safe > 0.99 * v and safe > 0.99 * v:
-                    v = safe
+                if deviation <= 0 or both_rules:
+                    v = _jerk(nominal[last], nominal[i], ratio[last], ratio[i], limit)
+                    if last_safe > 0.99 * v and safe > 0.99 * v:
+                        v = safe
+                if deviation > 0:
+                    across = acceleration_limit[which[i]]
+                    before, after = _direction(way[last], kind[last]), _direction(way[i], kind[i])
+                    v = min(v, _junction(length[i], across, acceleration[i], before, after, deviation), nominal[i])
+                    v = min(v, nominal[last])
             corner[i] = v * v
         last = i
         last_safe = safe
@@ -184,35 +179,47 @@ def _jerk(nominal_before: float, nominal: float, before: _F, after: _F, limit: _
 
 
 @njit(cache=True)
+def _direction(way: _F, kind: int) -> _F:
+    """Marlin's unit vector of a block: one only where filament moves, else the change of axes per unit of length.
+
+    A travel that moves X and turns A makes it longer than one, and its corners look straighter than they are.
+    """
+    if kind & 4 == 0:
+        return way.copy()
+    return way / math.sqrt((way * way).sum())
+
+
+@njit(cache=True)
 def _junction(length: float, limit: _F, acceleration: float, before: _F, after: _F, deviation: float) -> float:
     """Junction deviation of Marlin, with its limit on short segments that form an arc."""
-    size_before = 0.0
-    size_after = 0.0
-    dot = 0.0
-    for j in range(len(after)):
-        size_before += before[j] ** 2
-        size_after += after[j] ** 2
-        dot += before[j] * after[j]
-    cosine = -dot / math.sqrt(size_before * size_after)
+    cosine = -(before * after).sum()
     if cosine > 0.999999:
         return 0.0
     cosine = max(cosine, -0.999999)
-    size_before, size_after = math.sqrt(size_before), math.sqrt(size_after)
-    size = 0.0
-    for j in range(len(after)):
-        size += (after[j] / size_after - before[j] / size_before) ** 2
-    size = math.sqrt(size)
+    change = after - before
+    size = math.sqrt((change * change).sum())
     across = acceleration
     if size > 0:
         for j in range(len(after)):
-            share = abs(after[j] / size_after - before[j] / size_before) / size
+            share = abs(change[j]) / size
             if share * across > limit[j]:
                 across = limit[j] / share
     sine = math.sqrt(0.5 * (1.0 - cosine))
     squared = across * deviation * sine / (1.0 - sine)
     if length < 1.0 and cosine < -0.7071067812:
-        squared = min(squared, length * across / math.acos(-cosine))
+        squared = min(squared, length * across / (0.5 * math.pi - _arc_sine(-cosine)))
     return math.sqrt(squared)
+
+
+@njit(cache=True)
+def _arc_sine(t: float) -> float:
+    """Marlin's polynomial for it, 0.033 short of a right angle at 1 (JD_HANDLE_SMALL_SEGMENTS)."""
+    power = 1.0
+    total = 0.0
+    for factor in (0.032843707, -1.451838349, 29.66153956, -131.1123477, 262.8130562, -242.7199627, 84.31466202):
+        total += factor * power
+        power *= t
+    return total
 
 
 @njit(cache=True)

@@ -37,10 +37,12 @@ class Rules:
     """Moves that the planner looks ahead at least, whatever the profile says."""
     slowest: float
     """mm/s; slower moves are sped up to this."""
-    starts_at_corner_speed: bool
-    """Whether a move from rest starts with the corner speed at once (classic jerk) instead of from zero."""
-    whole_steps: bool = False
-    """Whether corners see positions rounded to whole motor steps."""
+    unseen_blocks: int = 0
+    """Places of the planner's queue that the plan of a move can never count on when the move begins."""
+    first_move_delay: float = 0.0
+    """s that fewer than three moves after a standstill wait for company before they begin."""
+    least_steps: int = 0
+    """Motor steps on some axis below which a move is left to the next one; corners see whole steps then. 0: neither."""
     shortest_linear: float = 0.0
     """mm: F is read over the rotaries where linear motion is no longer than this."""
     filament: str = "E"

@@ -36,10 +36,8 @@ def rates(folder: Path, program: list[str], row: int) -> tuple[np.ndarray, np.nd
 
 @pytest.mark.parametrize("seconds", [0.0, 0.05])
 def test_the_volume_of_a_line_is_the_integral_of_its_flow(seconds: float, tmp_path: Path) -> None:
-    """But for the jump of the filament's speed at the start of the line, which takes no time."""
-    jump = PROFILE.joints[0].corner_speed * 2 / 50
     times, rate, _ = rates(tmp_path, [f"M900 K{seconds}", *LINE], 1)
-    assert rate.mean() * (times[-1] - times[0]) == pytest.approx((2 - seconds * jump) * PROFILE.filament_area, rel=1e-3)
+    assert rate.mean() * (times[-1] - times[0]) == pytest.approx(2 * PROFILE.filament_area, rel=1e-3)
 
 
 def test_advance_pushes_more_while_speeding_up_and_draws_back_while_braking(tmp_path: Path) -> None:

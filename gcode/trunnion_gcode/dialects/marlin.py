@@ -17,7 +17,7 @@ SHORTEST_LINEAR = 1e-3
 DIALECT = Dialect(
     name="marlin",
     metric=functools.partial(linear_first, threshold=SHORTEST_LINEAR),
-    planner=Planner("marlin", blocks=2, slowest=0.05, in_steps=True),
+    planner=Planner("marlin", blocks=2, unseen=2, slowest=0.05, in_steps=True),
     shortest=2 * SHORTEST_LINEAR,
     minimum_steps=6,
     pressure_advance="M900 K%s",

@@ -28,7 +28,7 @@ def setup(profile: MachineProfile) -> tuple[str, ...]:
 DIALECT = Dialect(
     name="marlin_tcp",
     metric=functools.partial(linear_first, threshold=SHORTEST_LINEAR),
-    planner=Planner("marlin", blocks=2, slowest=0.05),
+    planner=Planner("marlin", blocks=2, unseen=2, slowest=0.05),
     tip_words=True,
     refuses=table_problem,
     enter=("G43.4",),

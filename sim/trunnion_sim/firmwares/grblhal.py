@@ -16,6 +16,5 @@ RULES = Rules(
     max_line=256,
     least_blocks=35,
     slowest=0.0,
-    starts_at_corner_speed=False,
     filament="U",
 )

@@ -16,6 +16,5 @@ RULES = Rules(
     max_line=4096,
     least_blocks=2,
     slowest=0.0,
-    starts_at_corner_speed=False,
     advance_axes="XY",
 )

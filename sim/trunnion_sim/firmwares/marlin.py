@@ -1,6 +1,7 @@
 """Marlin 2.1: commands of `gcode/gcode.cpp`, motion as in `module/planner.cpp` (classic jerk or junction deviation).
 
-F is read over the rotaries where the squared linear length is UNEAR_ZERO (`get_move_distance`).
+F is read over the rotaries where the squared linear length is UNEAR_ZERO (`get_move_distance`). Of the 16 places in the
+queue one stays empty, and one is free when a move begins and its end can no longer change.
 """
 
 from trunnion_sim.rules import Rules, codes
@@ -21,8 +22,9 @@ RULES = Rules(
     max_line=95,
     least_blocks=2,
     slowest=0.05,
-    starts_at_corner_speed=True,
-    whole_steps=True,
+    unseen_blocks=2,
+    first_move_delay=0.1,
+    least_steps=6,
     shortest_linear=1e-3,
     advance_axes="XYZ",
     advance_ratio=3.0,

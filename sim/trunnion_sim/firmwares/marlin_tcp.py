@@ -8,6 +8,5 @@ RULES = dataclasses.replace(
     marlin.RULES,
     name="marlin_tcp",
     commands=marlin.RULES.commands | {("G", 430), ("G", 434), ("G", 490)},
-    whole_steps=False,
     tip_words="G43.4",
 )

@@ -17,7 +17,6 @@ RULES = Rules(
     max_line=255,
     least_blocks=40,
     slowest=0.5,
-    starts_at_corner_speed=False,
     advance_axes="XY",
     advance="ramps",
 )
