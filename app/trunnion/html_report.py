@@ -68,6 +68,7 @@ def _scene(report: Report, profile: MachineProfile, findings: list[dict[str, Any
     scene = {
         "rows": {
             "time": _packed(trace.time[rows]),
+            "line": _packed(trace.line[rows]),
             "points": _packed(trace.points[rows]),
             "axes": _packed((trace.tool_axes[rows] * 32767).astype(np.int16)),
             "joints": _packed(trace.joints[rows]),

@@ -154,7 +154,9 @@ void main() { gl_Position = clip * model * vec4(position, 1.0); gl_PointSize = s
   vec3 n = mat3(model) * normal; float l = length(n);
   float light = l > 0.0 ? 0.45 + 0.55 * abs(dot(n / l, normalize(vec3(0.35, -0.5, 0.8)))) : 1.0; shade = colour * light; }`;
 const fragmentShader = `#version 300 es
-precision mediump float; in vec3 shade; uniform float alpha; out vec4 pixel; void main() { pixel = vec4(shade, alpha); }`;
+precision mediump float; in vec3 shade; uniform float alpha, ring; out vec4 pixel;
+void main() { float r = ring > 0.0 ? length(gl_PointCoord * 2.0 - 1.0) : 0.0; if (r > 1.0) discard;
+  pixel = vec4(r > 0.6 ? vec3(0.05) : shade, alpha); }`;
 function program() {
   const p = gl.createProgram();
   for (const [kind, text] of [[gl.VERTEX_SHADER, vertexShader], [gl.FRAGMENT_SHADER, fragmentShader]]) {
@@ -172,7 +174,7 @@ function attribute(place, source, stride, offset) {
 }
 if (!gl) byId("stage").textContent = "This browser has no WebGL 2, which the 3D view needs; the plots and findings work without.";
 const glProgram = gl && program(), place = (name) => gl.getUniformLocation(glProgram, name);
-const uniforms = gl && Object.fromEntries(["clip", "model", "size", "alpha"].map((name) => [name, place(name)]));
+const uniforms = gl && Object.fromEntries(["clip", "model", "size", "alpha", "ring"].map((name) => [name, place(name)]));
 const beads = gl && { shape: buffer(beadVertices()), colour: buffer(beadColours("role")) };
 const travels = gl && buffer(Float32Array.from(travelRows.flatMap((i) => Array.from(rows.points.subarray(i * 3 - 3, i * 3 + 3)))));
 const tool = gl && facts.tool.body.map((shape) => { const data = solid(shape); return { data: buffer(data), n: data.length / 6 }; });
@@ -204,7 +206,10 @@ let now = duration, picked = null;
 function draw() {
   drawPlots();
   const { row, q } = stateAt(now);
-  byId("now").textContent = `${now.toFixed(1)} s · ` + joints.map((j, i) => `${j.letter} ${(q[i] * j.shown).toFixed(1)}`).join("  ");
+  byId("now").textContent = [
+    `${now.toFixed(1)} s`, count ? `line ${rows.line[row]}` : "", joints.map((j, i) => `${j.letter} ${(q[i] * j.shown).toFixed(1)}`).join("  "),
+    count ? `${rows.speed[row].toFixed(1)} mm/s, ${rows.flow[row].toFixed(2)} mm³/s` : "",
+  ].join(" · ");
   if (!gl) return;
   const box = canvas.getBoundingClientRect(), ratio = devicePixelRatio || 1;
   canvas.width = Math.max(1, box.width * ratio); canvas.height = Math.max(1, box.height * ratio);
@@ -230,10 +235,12 @@ function draw() {
     gl.drawArrays(gl.POINTS, 0, deviation.value.length);
   }
   if (marks.length) {
-    gl.disable(gl.DEPTH_TEST); attribute(0, markBuffer, 12, 0); attribute(2, null); gl.vertexAttrib3f(2, 0.85, 0.1, 0.1);
-    gl.uniform1f(uniforms.size, 5 * ratio); gl.drawArrays(gl.POINTS, 0, marks.length);
-    if (picked?.point) { gl.uniform1f(uniforms.size, 16 * ratio); gl.drawArrays(gl.POINTS, marks.indexOf(picked), 1); }
-    gl.enable(gl.DEPTH_TEST);
+    gl.disable(gl.DEPTH_TEST); attribute(0, markBuffer, 12, 0); attribute(2, null); gl.uniform1f(uniforms.ring, 1);
+    gl.vertexAttrib3f(2, 1, 1, 1); gl.uniform1f(uniforms.size, 9 * ratio); gl.drawArrays(gl.POINTS, 0, marks.length);
+    if (picked?.point) {
+      gl.vertexAttrib3f(2, 1, 0.85, 0); gl.uniform1f(uniforms.size, 22 * ratio); gl.drawArrays(gl.POINTS, marks.indexOf(picked), 1);
+    }
+    gl.uniform1f(uniforms.ring, 0); gl.enable(gl.DEPTH_TEST);
   }
   if (byId("machine").checked) {
     gl.enable(gl.BLEND); gl.enable(gl.CULL_FACE); gl.depthMask(false); gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE); attribute(2, null);
@@ -279,6 +286,11 @@ function drawPlots() {
       pen.globalAlpha = 1; pen.fillStyle = ink;
       pen.fillText(`${plot.name}  ${least.toFixed(1)} … ${most.toFixed(1)}`, 6 * ratio, b * band + 12 * ratio);
     });
+    for (const finding of facts.findings.toReversed()) if (finding.time !== null) { // errors come first: on top
+      const x = finding.time / (duration || 1) * (width - 1);
+      pen.fillStyle = finding.severity === "error" ? "#d7263d" : "#e0a000";
+      pen.beginPath(); pen.moveTo(x - 5 * ratio, height); pen.lineTo(x + 5 * ratio, height); pen.lineTo(x, height - 11 * ratio); pen.fill();
+    }
     plotImage = pen.getImageData(0, 0, width, height);
   }
   const pen = plots.getContext("2d", { willReadFrequently: true });
@@ -291,7 +303,7 @@ function goTo(time) { now = Math.min(Math.max(time, 0), duration); byId("time").
 function legend() {
   const kind = byId("colour").value;
   byId("legend").innerHTML = byId("deviation").checked
-    ? `<span style="background:#3359f2"></span>${(-facts.deviation.range).toFixed(2)} mm below<span style="background:#f23326"></span>${facts.deviation.range.toFixed(2)} mm above`
+    ? `<span style="background:#3359f2"></span>${facts.deviation.range.toFixed(2)} mm below<span style="background:#f23326"></span>${facts.deviation.range.toFixed(2)} mm above`
     : kind === "role"
       ? facts.roles.filter((role) => role.present).map((role) => `<span style="background:#${role.colour}"></span>${role.name}`).join("")
       : [0, 0.5, 1].map((t) => `<span style="background:rgb(${ramp(t).map((c) => c * 255)})"></span>${(t * scale[kind]).toFixed(1)} ${unit[kind]}`).join("");
@@ -338,7 +350,9 @@ for (const finding of facts.findings) {
   button.className = finding.severity;
   button.addEventListener("click", () => {
     picked = finding;
-    if (finding.point) camera.target = [...finding.point];
+    byId("list").querySelector("[aria-current]")?.removeAttribute("aria-current");
+    button.setAttribute("aria-current", "true");
+    if (finding.point) { camera.target = [...finding.point]; camera.distance = Math.min(camera.distance, facts.size * 0.7); }
     goTo(finding.time ?? now);
   });
   item.append(button); byId("list").append(item);
