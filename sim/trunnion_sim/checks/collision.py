@@ -1,4 +1,4 @@
-"""No body of the machine enters the bed, the clamps or what is printed at that moment."""
+"""No body of the machine enters another, the bed, the clamps or what is printed at that moment."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,10 @@ from trunnion_core.findings import Finding
 from trunnion_sim.context import Context
 
 CODES = {
-    "collision": ("error", "A body of the machine enters the bed, a clamp or the part as far as it is printed."),
+    "collision": (
+        "error",
+        "A body of the machine enters the bed, a clamp, another body or the part as far as it is printed.",
+    ),
 }
 
 MOST = 40
@@ -16,16 +19,16 @@ MOST = 40
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """A finding for every run of rows in which one body enters something, at its deepest place."""
-    hits = context.hits
+    """A finding for every run of rows in which one body enters one other, at its deepest place."""
+    hits, names = context.hits, context.scene.names
     runs = []
-    for body, name in enumerate(context.scene.names):
-        mine = np.flatnonzero(hits.body == body)
-        if mine.size:
-            ends = np.flatnonzero(np.diff(hits.rows[mine]) > 1) + 1
-            runs += [(name, run) for run in np.split(mine, ends)]
+    pairs = np.unique(np.column_stack([hits.body, hits.other]), axis=0)
+    for body, other in pairs.tolist():
+        mine = np.flatnonzero((hits.body == body) & (hits.other == other))
+        ends = np.flatnonzero(np.diff(hits.rows[mine]) > 1) + 1
+        runs += [(f"{names[body]} enters {names[other]}", run) for run in np.split(mine, ends)]
     runs.sort(key=lambda run: int(hits.rows[run[1][0]]))
-    for number, (name, run) in enumerate(runs[:MOST]):
+    for number, (what, run) in enumerate(runs[:MOST]):
         deepest = int(run[hits.depth[run].argmax()])
         row, depth = int(hits.rows[deepest]), float(hits.depth[deepest])
         x, y, z = hits.points[deepest].tolist()
@@ -35,7 +38,7 @@ def check(context: Context) -> Iterator[Finding]:
         yield Finding(
             code="collision",
             severity="error",
-            message=f"{name} enters what stands at ({x:.2f}, {y:.2f}, {z:.2f}) mm by {depth:.2f} mm ({count} rows)",
+            message=f"{what} at ({x:.2f}, {y:.2f}, {z:.2f}) mm by {depth:.2f} mm ({count} rows)",
             line=int(context.motion.line[row]),
             row=row,
             layer=context.layer(row),

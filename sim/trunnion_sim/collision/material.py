@@ -8,22 +8,14 @@ from typing import Any
 
 from numba import njit
 
+from trunnion_sim.collision.field import BLOCK, CELL
+
 
 @njit(cache=True)
-def raise_bead(
-    cells: Any,
-    blocks: Any,
-    tiles: Any,
-    corner: Any,
-    cell: Any,
-    block: Any,
-    start: Any,
-    end: Any,
-    axis: Any,
-    width: Any,
-    height: Any,
-) -> Any:
+def raise_bead(field: Any, start: Any, end: Any, axis: Any, width: Any, height: Any) -> Any:
     """Lay one bead from start to end (tip positions, `part`), as wide and high as told; updates the three grids."""
+    cells, blocks, tiles, corner = field.cells, field.blocks, field.tiles, field.corner
+    cell, block = CELL, BLOCK
     ux, uy, uz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     length = math.sqrt(ux * ux + uy * uy + uz * uz)
     if length < 1e-9 or width <= 0.0:

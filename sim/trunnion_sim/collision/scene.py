@@ -1,87 +1,109 @@
-"""A profile as arrays for the compiled sweep: the joint chain, the bodies that move, the bed and what stands on it."""
+"""A profile as arrays for the compiled sweep: the joint chain, every body, which bodies can touch which."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
-from trunnion_core.solid_tables import BoxTable
-from trunnion_sim.collision.solids import middle_of, radius_of, row_of
+from trunnion_core.profile_file import BED
+from trunnion_core.solid_tables import BoxTable, CylinderTable, SolidTable
+from trunnion_sim.collision.field import PRESS
+from trunnion_sim.collision.place import Bodies, Chain
+from trunnion_sim.collision.solids import ball_of, rows_of
 
-CELL = 0.25
-"""mm between samples of what stands on the bed: finer than a bead is wide, so that no bead falls between two."""
-BLOCK = 8
-"""Cells along the side of a block, and blocks along the side of a tile, whose highest point prunes the search."""
-UNDER = -1e9
-"""Height in mm where nothing is: beyond the edge of the bed."""
+PART = "the part"
+"""What findings call everything that is printed so far."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything of a machine that can touch something else."""
 
-    work_side: NDArray[np.bool_]
-    """(k,) which joints carry the part."""
-    rotary: NDArray[np.bool_]
-    """(k,)."""
-    axes: FloatArray
-    """(k, 3) unit."""
-    pivots: FloatArray
-    """(k, 3) mm."""
-    origin: FloatArray
-    """(3,) mm."""
-    bodies: FloatArray
-    """(b, 8) rows of `solids`."""
-    middles: FloatArray
-    """(b, 3) mm in the body's frame."""
-    radii: FloatArray
-    """(b,) mm about the middle."""
-    turns: FloatArray
-    """(b, 3, 3) machine from body, all joints at zero."""
-    places: FloatArray
-    """(b, 3) mm: origin of the body's frame in the machine, all joints at zero."""
-    carried: IntArray
-    """(b,) how many joints of the tool side, from the frame outwards, carry the body."""
-    nozzle: NDArray[np.bool_]
-    """(b,) bodies in the tool frame, whose tip touches the bead being laid."""
+    chain: Chain
+    bodies: Bodies
+    """The last is a box around what is printed, which stands for `PART`."""
     names: tuple[str, ...]
-    corner: FloatArray
-    """(2,) mm in `part`: centre of the first cell."""
-    ground: NDArray[np.float32]
-    """(nx, ny) mm in `part`: top of bed and clamps; UNDER beyond the edge."""
-    floor: float
-    """mm in `part`: underside of the bed."""
+    """(b,)."""
+    pairs: IntArray
+    """(p, 2) bodies that move against each other and are not meant to touch."""
+    low: FloatArray
+    """(2,) mm in `part`: corner of what the bed, or anything printed on it, covers."""
+    high: FloatArray
+
+    @property
+    def part(self) -> int:
+        """The body that stands for what is printed."""
+        return len(self.names) - 1
 
 
 def make_scene(profile: MachineProfile) -> Scene:
     """The arrays of a machine."""
-    tool_turn = _tool_frame(profile.tool_axis)
-    carriers = ["frame", *(joint.letter for joint in profile.joints if joint.side == "tool")]
-    tool, others = profile.tool_bodies, profile.bodies
-    rows = [row_of(solid) for solid in (*tool, *(body.solid for body in others))]
-    corner, ground = _ground(profile)
-    return Scene(
+    chain = Chain(
         work_side=np.array([joint.side == "work" for joint in profile.joints]),
         rotary=np.array([joint.rotary for joint in profile.joints]),
         axes=np.stack([joint.axis for joint in profile.joints]),
         pivots=np.stack([joint.point for joint in profile.joints]),
         origin=profile.origin,
-        bodies=np.array(rows).reshape(len(rows), 8),
-        middles=np.array([middle_of(row) for row in rows]).reshape(len(rows), 3),
-        radii=np.array([radius_of(row) for row in rows]),
-        turns=np.array([tool_turn] * len(tool) + [np.eye(3)] * len(others)).reshape(len(rows), 3, 3),
-        places=np.array([profile.tip] * len(tool) + [np.zeros(3)] * len(others)).reshape(len(rows), 3),
-        carried=np.array(
-            [len(carriers) - 1] * len(tool) + [carriers.index(body.carried_by) for body in others], dtype=np.int64
-        ),
-        nozzle=np.array([True] * len(tool) + [False] * len(others), dtype=np.bool_),
-        names=(*(solid.name for solid in tool), *(body.solid.name for body in others)),
-        corner=corner,
-        ground=ground,
-        floor=-profile.bed.thickness,
     )
+    tool_turn, upright = _tool_frame(profile.tool_axis), np.eye(3)
+    work = chain.work_side
+    bed = _plate(profile, 0.0)
+    entries = [(solid, tool_turn, profile.tip, ~work) for solid in profile.tool_bodies]
+    entries += [(body.solid, upright, np.zeros(3), _carriers(profile, body.carried_by)) for body in profile.bodies]
+    entries += [(solid, upright, profile.origin, work) for solid in profile.work_bodies]
+    # the nozzle may press on the plate as it may on plastic: for it the plate lies lower by as much
+    entries += [(bed, upright, profile.origin, work), (_plate(profile, PRESS), upright, profile.origin, work)]
+    part = BoxTable.model_construct(shape="box", name=PART, min=(0.0, 0.0, 0.0), max=(0.0, 0.0, 0.0))
+    entries.append((part, upright, profile.origin, work))
+    rows, corners, faces = rows_of([entry[0] for entry in entries])
+    balls = [ball_of(row, corners) for row in rows]
+    bodies = Bodies(
+        rows=rows,
+        corners=corners,
+        faces=faces,
+        middles=np.array([ball[0] for ball in balls]),
+        radii=np.array([ball[1] for ball in balls]),
+        turns=np.array([entry[1] for entry in entries]),
+        places=np.array([entry[2] for entry in entries]),
+        carried=np.array([entry[3] for entry in entries]),
+        tool=np.arange(len(entries)) < len(profile.tool_bodies),
+    )
+    names = tuple(entry[0].name for entry in entries)
+    chosen = np.array(list(_pairs(profile, bodies, names)), dtype=np.int64).reshape(-1, 2)
+    low, high = _extent(bed)
+    return Scene(chain, bodies, names, chosen, low, high)
+
+
+def _pairs(profile: MachineProfile, bodies: Bodies, names: tuple[str, ...]) -> Iterator[tuple[int, int]]:
+    """Pairs of bodies that some joint moves against each other, but for those that touch by design."""
+    excused = {frozenset((body.solid.name, name)) for body in profile.bodies for name in body.touches}
+    plate, lowered = len(names) - 3, len(names) - 2
+    presses = bodies.tool & (np.array([_bottom(row, bodies.corners) for row in bodies.rows]) < PRESS)
+    for first in range(len(names)):
+        for second in range(first + 1, len(names)):
+            moves = (bodies.carried[first] != bodies.carried[second]).any()
+            other_plate = second == (plate if presses[first] else lowered)
+            if moves and not other_plate and frozenset((names[first], names[second])) not in excused:
+                yield first, second
+
+
+def _bottom(row: FloatArray, corners: FloatArray) -> float:
+    """mm: the lowest point of a solid in its own frame."""
+    if row[0] == 2.0:
+        return float(corners[int(row[1]) : int(row[2]), 2].min())
+    return float(row[3])
+
+
+def _carriers(profile: MachineProfile, carried_by: str) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(k,) which joints carry what the joint of that letter carries: those of its side, up to itself."""
+    letters = [joint.letter for joint in profile.joints]
+    if carried_by not in letters:
+        return np.zeros(len(letters), np.bool_)
+    last = letters.index(carried_by)
+    side = profile.joints[last].side
+    return np.array([joint.side == side and k <= last for k, joint in enumerate(profile.joints)])
 
 
 def _tool_frame(axis: FloatArray) -> FloatArray:
@@ -92,36 +114,19 @@ def _tool_frame(axis: FloatArray) -> FloatArray:
     return np.stack([x, np.cross(axis, x), axis], axis=1)
 
 
-def _ground(profile: MachineProfile) -> tuple[FloatArray, NDArray[np.float32]]:
-    """Corner and heights of the empty bed, clamps included, padded to whole tiles."""
+def _plate(profile: MachineProfile, lower: float) -> BoxTable | CylinderTable:
+    """The bed as a solid in `part`, `lower` mm below its place."""
     bed = profile.bed
-    if bed.shape == "circle" and bed.diameter is not None:
-        low, high = np.full(2, -bed.diameter / 2), np.full(2, bed.diameter / 2)
-    else:
-        low, high = np.array(bed.min, dtype=float), np.array(bed.max, dtype=float)
-    for solid in profile.work_bodies:
-        row = row_of(solid)
-        middle, radius = middle_of(row)[:2], radius_of(row)
-        low, high = np.minimum(low, middle - radius), np.maximum(high, middle + radius)
-    tile = BLOCK * BLOCK
-    nx, ny = (int(np.ceil(span / CELL / tile)) * tile for span in high - low)
-    x = low[0] + (np.arange(nx) + 0.5) * CELL
-    y = low[1] + (np.arange(ny) + 0.5) * CELL
-    grid_x, grid_y = np.meshgrid(x, y, indexing="ij")
-    ground = np.full((nx, ny), UNDER, dtype=np.float32)
-    if bed.shape == "circle" and bed.diameter is not None:
-        ground[grid_x**2 + grid_y**2 <= (bed.diameter / 2) ** 2] = 0.0
-    elif bed.min is not None and bed.max is not None:
-        on = (grid_x >= bed.min[0]) & (grid_x <= bed.max[0]) & (grid_y >= bed.min[1]) & (grid_y <= bed.max[1])
-        ground[on] = 0.0
-    for solid in profile.work_bodies:
-        if isinstance(solid, BoxTable):
-            inside = (grid_x >= solid.min[0]) & (grid_x <= solid.max[0])
-            inside &= (grid_y >= solid.min[1]) & (grid_y <= solid.max[1])
-            top = solid.max[2]
-        else:
-            row = row_of(solid)
-            inside = (grid_x - row[1]) ** 2 + (grid_y - row[2]) ** 2 <= max(row[5], row[6]) ** 2
-            top = solid.top
-        ground[inside] = np.maximum(ground[inside], top)
-    return np.array([x[0], y[0]]), ground
+    bottom = -bed.thickness - lower
+    if bed.min is not None and bed.max is not None:
+        return BoxTable(shape="box", name=BED, min=(*bed.min, bottom), max=(*bed.max, -lower))
+    assert bed.diameter is not None
+    return CylinderTable(shape="cylinder", name=BED, bottom=bottom, top=-lower, diameter=bed.diameter)
+
+
+def _extent(bed: SolidTable) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest corner (2,) mm of the bed seen from above."""
+    if isinstance(bed, BoxTable):
+        return np.array(bed.min[:2]), np.array(bed.max[:2])
+    assert isinstance(bed, CylinderTable)
+    return np.full(2, -bed.diameter / 2), np.full(2, bed.diameter / 2)
