@@ -8,8 +8,7 @@ from trunnion.samples._solids import dome, from_manifold, sheet, to_manifold
 from trunnion_core.arrays import FloatArray
 from trunnion_core.mesh import Mesh
 
-SETTINGS: dict[str, Any] = {"nonplanar_smoothing": 0}
-"""At the ring's rim the slope turns within a millimetre; a tool that lags behind it touches the rim's own wall."""
+SETTINGS: dict[str, Any] = {}
 
 RING_RADIUS, RING_HALF, HUB_RADIUS = 17.5, 3.4, 6.0
 """mm: middle of the ring, half its width, and the hub."""

@@ -167,16 +167,20 @@ class Scene:
         """Least clearance (n,) and its body of the head on the skin (n, 3) and on the lowest layer under it."""
         least, body = np.full(len(tips), NEAR), np.full(len(tips), -1, np.int64)
         for depth in sorted({0.0, self.depth}):
-            gap, nearby = self.around(tips + depth * steps, axes, depth, NEAR)
+            gap, nearby = self._nearest(tips + depth * steps, axes, depth, NEAR)
             body = np.where(gap < least, nearby, body)
             least = np.minimum(gap, least)
         return least, body
 
-    def around(self, tips: FloatArray, axes: FloatArray, depth: float, far: float) -> tuple[FloatArray, IntArray]:
-        """Clearance (n,) and its body of the head at poses on the layer that lies `depth` mm under the skin.
+    def gap(self, tips: FloatArray, axes: FloatArray, far: float, *, depth: float) -> FloatArray:
+        """Clearance (n,) of the head at poses (n, 3) on the layer that lies `depth` mm under the skin.
 
-        Clearance beyond `far` mm is not looked for; there is no body then (-1).
+        Clearance beyond `far` mm is not looked for, and that is returned.
         """
+        gap, _ = self._nearest(tips, axes, depth, far)
+        return gap
+
+    def _nearest(self, tips: FloatArray, axes: FloatArray, depth: float, far: float) -> tuple[FloatArray, IntArray]:
         from trunnion_slicer.nonplanar.access_kernel import nearest
 
         gap, body, _ = nearest(

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from shapely.geometry import MultiPolygon
@@ -10,6 +12,7 @@ from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.bead import bead_width
 from trunnion_core.layers import Bead, Layer
 from trunnion_core.settings import PrintSettings
+from trunnion_slicer.nonplanar.clear import kept_clear
 from trunnion_slicer.nonplanar.fair import faired, refined
 from trunnion_slicer.nonplanar.field import even_axes
 from trunnion_slicer.nonplanar.footprint import footprint
@@ -20,6 +23,9 @@ from trunnion_slicer.nonplanar.paths import FlatPath, flat_paths
 from trunnion_slicer.nonplanar.project import Lifted, lift
 from trunnion_slicer.nonplanar.smooth import into_cone, smoothed
 from trunnion_slicer.nonplanar.stairs import gap_over_stairs
+
+if TYPE_CHECKING:
+    from trunnion_slicer.nonplanar.access import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +51,11 @@ def sheet(stack: Surfaces, layer: int) -> Sheet:
     return Sheet(stack, layer, grid, footprint(surface, stack.patch.border, grid))
 
 
-def beads_of(on: Sheet, planar: Sequence[Layer], settings: PrintSettings) -> list[Bead]:
-    """Every bead of a layer on one patch: walls, then infill. The lowest layer lies on the beads of `planar`."""
+def beads_of(on: Sheet, planar: Sequence[Layer], settings: PrintSettings, scene: "Scene | None" = None) -> list[Bead]:
+    """Every bead of a layer on one patch: walls, then infill. The lowest layer lies on the beads of `planar`.
+
+    Smoothed tool axes keep the head out of what stands in the `scene`.
+    """
     paths = flat_paths(on.stack, on.layer, on.outline, settings)
     if not paths:
         return []
@@ -63,6 +72,9 @@ def beads_of(on: Sheet, planar: Sequence[Layer], settings: PrintSettings) -> lis
         cone = float(np.radians(settings.nonplanar_smoothing))
         wanted = into_cone(even_axes(lifted.points, on.grid, normals, cone), lifted.axes, cone)
         axes = smoothed(lifted.points, lifted.axes, wanted, lifted.starts, cone)
+        if scene is not None:
+            gap = partial(scene.gap, depth=on.layer * settings.layer_height)
+            axes = kept_clear(lifted.points, axes, lifted.axes, lifted.starts, gap)
         lifted = replace(lifted, points=faired(lifted.points, lifted.starts))
     height = _thickness(lifted) if lowest else np.full(len(axes), settings.layer_height)
     if settings.nonplanar_tool_axis == "vertical":
