@@ -33,6 +33,7 @@ class TipControl:
         self._tilting = tool[0] if tool else first
         self._turning = next(column for column in profile.rotary if column != self._tilting)
         self.segments_per_second = SEGMENTS_PER_SECOND
+        self.rotary = profile.rotary
         place = np.array([profile.letters.index(letter) for letter in "XYZ"])
         axis = np.array([joint.axis for joint in joints])
         tool_side = np.array([joint.side == "tool" for joint in joints])

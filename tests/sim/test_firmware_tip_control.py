@@ -124,10 +124,11 @@ def test_a_move_at_fixed_angles_is_one_block() -> None:
     np.testing.assert_allclose(trace.points[-1], [10.0, 5.0, 8.0], atol=0.03)
 
 
-@pytest.mark.parametrize("words", ["X150 Y150 Z150 A60 B60", "A61", "X500"])
-def test_what_is_out_of_reach_is_dropped_with_an_ok(words: str) -> None:
+@pytest.mark.parametrize("words", ["X161 A10", "Y-160.1 B3"])
+def test_a_turn_whose_end_is_out_of_reach_is_dropped_with_an_ok(words: str) -> None:
+    """DerAndere1/Marlin `motion.cpp`: `position_is_reachable` of a move that turns; before homing nothing limits it."""
     talk = Talk(CRADLE)
-    talk.ask("G28", "G43.4", "G1 X10 Y10 Z10 A5 F3000", "M400")
+    talk.ask("G43.4", "G1 X10 Y10 Z10 A5 F3000", "M400")
     before, blocks = talk.ask("M114"), len(talk.machine.trace())
     assert talk.ask(f"G1 {words} E3") == "ok\n"
     talk.ask("M400")
@@ -137,18 +138,43 @@ def test_what_is_out_of_reach_is_dropped_with_an_ok(words: str) -> None:
     assert talk.position()["X"] == 11.0
 
 
-def test_switching_moves_nothing_and_the_words_change() -> None:
+def test_after_homing_words_are_cut_to_the_limits_of_their_letters_and_joints_to_none() -> None:
+    """`apply_motion_limits` sees the words; the joints behind them are not looked at and leave their travel."""
+    talk = Talk(CRADLE)
+    talk.ask("G28", "G43.4", "G1 X10 Y10 Z10 F6000", "G1 A70 X500", "M400")
+    shown = talk.position()
+    assert (shown["X"], shown["A"]) == (160.0, 60.0)
+    talk.ask("G1 X150 Y150 Z150 A60 B60", "M400")
+    joints = talk.machine.trace().joints[-1] * CRADLE.to_shown
+    over = np.maximum(joints - [160, 160, 220, 60, 60], [-160, -160, -80, -60, -60] - joints)
+    assert over.max() > 10.0
+
+
+def test_switching_with_the_table_level_changes_nothing() -> None:
+    talk = Talk(CRADLE)
+    talk.ask("G1 X10 Y20 Z30 F6000", "M400")
+    before = talk.ask("M114")
+    assert talk.ask("G43.4") == "ok\n"
+    assert talk.ask("M114") == before
+    talk.ask("G49")
+    assert talk.ask("M114") == before
+
+
+def test_switching_with_the_table_tilted_keeps_the_words_and_loses_the_joints() -> None:
+    """`GcodeSuite::G43` ends in `sync_plan_position`: the counts become what the words mean now; nothing moves."""
     talk = Talk(CRADLE)
     talk.ask("G1 X10 Y20 Z30 A30 F6000", "M400")
-    joints = talk.position()
-    blocks = len(talk.machine.trace())
+    words, blocks = talk.position(), len(talk.machine.trace())
+    stood = talk.machine.trace().joints[-1]
     talk.ask("G43.4")
-    tip, _ = forward(CRADLE, np.array([[10.0, 20.0, 30.0, math.radians(30), 0.0]]))
-    shown = talk.position()
-    np.testing.assert_allclose([shown["X"], shown["Y"], shown["Z"]], tip[0], atol=0.006)
-    talk.ask("G49")
-    assert talk.position() == joints
+    assert talk.position() == words
+    believed = control(CRADLE).joints(np.array([10.0, 20.0, 30.0, 30.0, 0.0]))[0]
+    counts = talk.ask("M114").split("Count ")[1].split()
+    assert int(counts[1][2:]) == round(believed[1] * 80)
     assert len(talk.machine.trace()) == blocks
+    talk.ask("G1 A0", "M400")
+    moved = talk.machine.trace().joints[-1] - stood
+    np.testing.assert_allclose((moved * CRADLE.to_shown)[1:4], [20 - believed[1], 30 - believed[2], -30], atol=0.03)
 
 
 def test_homing_with_tip_control_on_ends_at_the_endstops() -> None:
@@ -166,7 +192,7 @@ def test_machines_the_fork_does_not_know_have_no_tip_control(name: str, code: st
 
 def test_the_reported_geometry_is_the_profile_s_and_m665_moves_it() -> None:
     talk = Talk(MACHINES["voron"])
-    assert talk.ask("M665") == "echo:  M665 S200.00 X0.00 Y0.00 Z0.00 I0.00 J0.00 K-12.00\nok\n"
+    assert talk.ask("M665") == "  M665 S200.00 X0.00 Y0.00 Z0.00 I0.00 J0.00 K-12.00\nok\n"
     assert "  M665 S200.00 X0.00" in talk.ask("M503")
     talk.ask("G43.4", "G1 X5 Y5 Z20 B20 F3000", "M400")
     right = talk.machine.trace().points[-1]
@@ -174,12 +200,12 @@ def test_the_reported_geometry_is_the_profile_s_and_m665_moves_it() -> None:
     wrong = talk.machine.trace().points[-1]
     moved = 2 * 1.5 * math.sin(math.radians(10))
     assert np.linalg.norm(wrong - right) == pytest.approx(moved, abs=0.05)
-    assert talk.ask("M665").startswith("echo:  M665 S100.00")
+    assert talk.ask("M665").startswith("  M665 S100.00")
 
 
 def test_the_head_s_arm_is_what_m665_z_says() -> None:
     talk = Talk(MACHINES["head-table"])
-    assert talk.ask("M665") == "echo:  M665 S200.00 Z60.00\nok\n"
+    assert talk.ask("M665") == "  M665 S200.00 Z60.00\nok\n"
     talk.ask("M665 Z61", "G43.4", "G1 B30 F1200", "M400")
     off = talk.machine.trace().points[-1] - talk.machine.trace().points[0]
     assert np.linalg.norm(off) == pytest.approx(2 * math.sin(math.radians(15)), abs=0.05)

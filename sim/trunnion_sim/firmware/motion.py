@@ -1,7 +1,8 @@
 """What the firmware believes of its axes: position, modes, offsets, limits (Marlin 2.1 `motion.cpp`, `G0_G1.cpp`).
 
 Positions are native, in mm and degrees with the filament last; G92 shifts what a person reads and writes, not them.
-Native positions are joints, or with tip control (G43.4) the tip over the part and the angles.
+Native positions are joints, or with tip control (G43.4) the tip over the part and the angles. Soft limits hold for
+native positions: with tip control the joints behind them may go anywhere.
 """
 
 import math
@@ -12,6 +13,8 @@ import numpy as np
 from trunnion_core.profile import MachineProfile
 from trunnion_sim.tip_control import tip_control_of
 
+REACH = 1e-4
+"""mm that a place may be past an end and still be reached (`fslop`)."""
 STARTING_FEED = 25.0
 """mm/s before the first F word."""
 LONGEST_EXTRUSION = 200.0
@@ -59,11 +62,10 @@ class Motion:
         if self.tip is not None and self.tip_controlled:
             self.position[:-1] = self.tip.native(np.array(self.position[:-1])).tolist()
 
-    def control_tip(self, on: bool) -> None:
-        """G43.4 and G49: the place stays, its words change."""
-        joints = self.joints
-        self.tip_controlled = on
-        self.stand_at(joints)
+    def out_of_reach(self, goal: Sequence[float]) -> bool:
+        """Whether tip control drops a move: only its X and Y are looked at, and no joint ever."""
+        ends = ((goal[i], self.low[i], self.high[i]) for i in (self.columns["X"], self.columns["Y"]))
+        return any(not low - REACH <= value <= high + REACH for value, low, high in ends)
 
     def logical(self) -> list[float]:
         """What M114 shows."""

@@ -1,7 +1,7 @@
 """From a move command to planner blocks: straight moves, moves under tip control, arcs.
 
 Marlin 2.1 `G0_G1.cpp` and `G2_G3.cpp`; under tip control the fork's `line_to_destination_kinematic`: a move that turns
-a rotary is cut into pieces by time, and one whose end is out of reach is dropped with an ok.
+a rotary is cut into pieces by time, and dropped with an ok where X or Y of its end is past the machine's.
 """
 
 import math
@@ -19,6 +19,8 @@ from trunnion_sim.firmware.waits import Steps, Wait
 if TYPE_CHECKING:
     from trunnion_sim.firmware.machine import SoftwareMachine
 
+STILL = 1e-6
+"""Degrees of a turn that is none (NEAR_ZERO)."""
 TOO_COLD = 1.0
 """Degrees C below the coldest extrusion at which it is refused (TEMP_WINDOW)."""
 SHORTEST_CHORD, LONGEST_CHORD = 0.1, 1.0
@@ -76,9 +78,12 @@ def _joint_block(machine: "SoftwareMachine", goal: list[float]) -> None:
 def _tip_line(machine: "SoftwareMachine", goal: list[float]) -> Steps | None:
     motion = machine.motion
     tip = motion.tip
-    if tip is None or not tip.joints(np.array(goal[:-1]))[1]:
+    if tip is None:
         return None
     begin = motion.position
+    motion.limit(goal)
+    if any(abs(goal[i] - begin[i]) >= STILL for i in tip.rotary) and motion.out_of_reach(goal):
+        return None
     count, _ = tip_kernel.pieces(
         tip.geometry,
         np.array(begin[:-1]),

@@ -139,6 +139,13 @@ class Planner:
         self._motors[1, :-1] = values
         self.state[kernel.PREVIOUS_NOMINAL] = 0.0
 
+    def rename(self, values: "Sequence[float]") -> None:
+        """Call the end of the queue these mm and degrees; nothing moves, what is queued runs as it was planned."""
+        steps = np.floor(np.asarray(values) * self.limits[kernel.STEPS_PER_UNIT, :-1] + 0.5)
+        shift = steps - self._position[:-1]
+        self._position[:-1] += shift
+        self._motors[0, :-1] += shift
+
     def refresh(self, values: "Sequence[float]") -> None:
         """Count steps anew after the steps per unit have changed; `values` (n,) is where the queue ends."""
         steps = np.floor(np.asarray(values) * self.limits[kernel.STEPS_PER_UNIT] + 0.5)
