@@ -17,6 +17,17 @@ def linear_first(linear: FloatArray, rotary: FloatArray, filament: FloatArray, t
     return np.asarray(np.where(straight > threshold, straight, without_linear))
 
 
+def linear_then_filament(linear: FloatArray, rotary: FloatArray, filament: FloatArray) -> FloatArray:
+    """LinuxCNC's order, where the filament is a U axis: X, Y and Z, else U, V and W, else the angles in degrees.
+
+    LinuxCNC `src/emc/rs274ngc/interp_find.cc`, find_straight_length.
+    """
+    straight = np.linalg.norm(linear, axis=1)
+    fed = np.abs(filament)
+    without_linear = np.where(fed > 0, fed, np.linalg.norm(rotary, axis=1))
+    return np.asarray(np.where(straight > 0, straight, without_linear))
+
+
 def all_axes(linear: FloatArray, rotary: FloatArray, filament: FloatArray) -> FloatArray:
     """The length over every axis, millimetres and degrees mixed, the filament being one of them."""
     return np.asarray(np.linalg.norm(np.column_stack([linear, rotary, filament]), axis=1))

@@ -8,9 +8,8 @@ Corners = Literal["marlin", "reprapfirmware", "klipper", "grbl", "blend"]
 
 marlin: classic jerk, or junction deviation where the profile gives one. reprapfirmware: no axis jumps by more than its
 corner speed. klipper: junction deviation over X, Y and Z from a square corner velocity, extra axes by their own corner
-speed, cruising held back where it would be short. grbl: junction deviation over all axes. blend: every move starts to
-ramp up while the one before it ramps down, each with half its acceleration, so none is faster than its own length lets
-it be.
+speed, cruising held back where it would be short. grbl: junction deviation over all axes. blend: every move by itself
+from rest to rest with half its acceleration, the next one setting off while it slows down (LinuxCNC).
 """
 
 

@@ -5,7 +5,7 @@ each move by its own length, and makes its own ramps and corners with its own lo
 the rows' durations are those of the print.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.feed import speeds_read
 from trunnion_gcode.moves import Moves, make_moves
 from trunnion_motion import executed_kernel as kernel
+from trunnion_motion.overlapping import Path, overlapping
 from trunnion_motion.timelaw import TimeLaw
 
 UNLIMITED = 1e12
@@ -51,6 +52,8 @@ def executed(program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, d
         return Execution(ideal, program.cruise)
     drive = _drive(moves, program, profile, dialect)
     nominal = drive.nominal
+    if dialect.planner.corners == "blend":
+        return _blended(program, ideal, moves, drive)
     for _ in range(BENDS):
         corner, _rest = drive.corners(nominal)
         nominal = kernel.bent(drive.share, nominal, moves.metric, corner, drive.acceleration)
@@ -66,6 +69,33 @@ def executed(program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, d
         blocks = len(nominal) + 1 if seen is None else max(seen, profile.planner.blocks - dialect.planner.unseen)
         entry, peak, leave = kernel.ramps(drive.length, nominal, drive.ramp, corner, rest, stops, blocks)
     return _per_row(program, ideal, moves, _Trapezoids(entry, peak, leave, drive.ramp, asked))
+
+
+def _blended(program: MachineProgram, ideal: TimeLaw, moves: Moves, drive: "_Drive") -> Execution:
+    """The law where moves overlap instead of following each other.
+
+    Two that overlap may together be faster than either was meant to be; then they are asked to be slower.
+    """
+    linear = np.flatnonzero(drive.linear)
+    straight = (drive.kind & 2) > 0
+    along_x = np.array([drive.letters[column] == "X" for column in linear], dtype=np.float64)
+    path = Path(
+        length=moves.metric,
+        wanted=drive.nominal,
+        push=drive.ramp,
+        direction=np.where(straight[:, None], drive.share[:, linear], along_x),
+        plain=straight & ~drive.share[:, ~drive.linear].any(axis=1),
+        stops=_stops(moves, program),
+    )
+    most, tolerance = drive.acceleration[linear], drive.dialect.planner.tolerance
+    nominal = drive.nominal
+    for _ in range(BENDS):
+        _, peak, _, _ = overlapping(replace(path, wanted=nominal), most, tolerance)
+        nominal = nominal * np.minimum(1.0, drive.nominal / peak)
+    asked = moves.metric / nominal
+    read = np.maximum(speeds_read(moves, asked, drive.dialect), drive.dialect.planner.slowest)
+    ramps = overlapping(replace(path, wanted=np.minimum(read, drive.reach)), most, tolerance)
+    return _per_row(program, ideal, moves, _Trapezoids(*ramps, asked))
 
 
 @dataclass(frozen=True)
@@ -118,6 +148,8 @@ class _Drive:
     deviation: float | None
     """mm of junction deviation, where the profile gives one."""
     config: "KlipperConfig"
+    letters: tuple[str, ...]
+    """k of the joints."""
 
     def corners(self, nominal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(m,) speed allowed into every move from the one before, and (m,) from rest."""
@@ -137,9 +169,6 @@ class _Drive:
                 self.corner_speed,
                 self.config.deviation,
             )
-            return corner, rest
-        if rules.corners == "blend":
-            corner = kernel.blended_corners(self.share, self.linear, self.kind, nominal, self.ramp, rules.tolerance)
             return corner, rest
         if rules.corners == "grbl" or self.deviation is not None:
             across = DEFAULT_DEVIATION if self.deviation is None else self.deviation
@@ -162,7 +191,7 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
     printing = UNLIMITED if planner.acceleration is None else planner.acceleration
     travelling = printing if planner.travel_acceleration is None else planner.travel_acceleration
     kind = _kinds(moves, profile)
-    along = np.where(kind & 1, np.where(moves.filament > 0, printing, travelling), UNLIMITED)
+    along = np.where(kind & 1, np.where(moves.filament != 0, printing, travelling), UNLIMITED)
     if dialect.planner.corners in ("grbl", "blend"):
         along = np.full(len(along), UNLIMITED)
     linear = np.array([not joint.rotary for joint in profile.joints] + [False])
@@ -179,9 +208,6 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
     else:
         with np.errstate(divide="ignore"):
             reach, push = (speed / np.abs(share)).min(axis=1), (acceleration / np.abs(share)).min(axis=1)
-    if dialect.planner.corners == "blend":
-        push = 0.5 * push
-        reach = np.minimum(reach, np.sqrt(np.minimum(along, push) * moves.metric))
     return _Drive(
         dialect=dialect,
         length=moves.metric,
@@ -196,6 +222,7 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
         linear=linear,
         deviation=planner.junction_deviation,
         config=config,
+        letters=profile.letters,
     )
 
 

@@ -272,32 +272,3 @@ def smoothed_ramps(
             entry[i], peak[i], leave[i] = min(begin[i], cruise), cruise, min(out, cruise)
         out, out_soft = begin[i], start_soft
     return np.sqrt(entry), np.sqrt(peak), np.sqrt(leave)
-
-
-@numba.njit(cache=True, error_model="numpy")
-def blended_corners(
-    share: FloatArray, linear: BoolArray, kind: IntArray, nominal: FloatArray, ramp: FloatArray, tolerance: float
-) -> FloatArray:
-    """(m,) speed in the middle of LinuxCNC's parabolic blends, where the old and the new velocity are there by halves.
-
-    A blend may leave the corner by `tolerance`, which bounds the speed at which it begins.
-    """
-    m, columns = share.shape
-    corner = np.zeros(m)
-    for i in range(1, m):
-        if kind[i] % 4 != kind[i - 1] % 4:
-            continue
-        dot, size = 0.0, 0.0
-        old = 0.0
-        for j in range(columns):
-            if linear[j] or kind[i] % 4 != 3:
-                dot += share[i, j] * share[i - 1, j]
-                size += share[i, j] ** 2
-                old += share[i - 1, j] ** 2
-        cosine = min(max(dot / np.sqrt(size * old), -1.0), 1.0)
-        half, other = np.sqrt(0.5 * (1.0 + cosine)), np.sqrt(0.5 * (1.0 - cosine))
-        speed = min(nominal[i], nominal[i - 1])
-        if other > 0.0:
-            speed = min(speed, 2.0 * np.sqrt(min(ramp[i], ramp[i - 1]) * tolerance / other))
-        corner[i] = half * speed
-    return corner

@@ -10,7 +10,7 @@ import numpy as np
 
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
-from trunnion_sim import motion_kernel, replay_kernel, toolhead_kernel
+from trunnion_sim import blends, motion_kernel, replay_kernel, toolhead_kernel
 from trunnion_sim.limits import Limits
 from trunnion_sim.merging import blocks_of, laws_of_rows
 from trunnion_sim.motion import Motion
@@ -27,8 +27,6 @@ NO_WORD = 1e-7
 """mm: smaller than the last decimal of any word."""
 WITHOUT_F = 25.0
 """mm/s before the first F, as Klipper has it."""
-BLEND_TOLERANCE = 0.01
-"""mm: the P of G64 that Trunnion's programs for LinuxCNC set."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,14 +157,7 @@ def _law(
         blocks = max(rules.least_blocks, profile.planner.blocks)
         law = toolhead_kernel.grbl(delta, feed, motion.inverse, stops, *first, across, blocks)
     elif rules.corners == "linuxcnc":
-        if motion.of_tip.size:
-            steps = _tip_steps(motion, profile)
-            for place, letter in enumerate("XYZ"):
-                column = profile.letters.index(letter)
-                delta[:, column] = np.where(motion.of_tip, steps[:, place], delta[:, column])
-        law = toolhead_kernel.linuxcnc(
-            delta, np.append(linear, False), feed, motion.inverse, stops, *first, BLEND_TOLERANCE
-        )
+        law = blends.blended(motion, profile, delta, feed, stops, *first)
     else:
         return _marlin_or_duet(motion, profile, rules, limits, delta, homing, stops)
     return _homed(law, delta, homing, limits.speed[0])

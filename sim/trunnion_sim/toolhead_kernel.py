@@ -1,13 +1,10 @@
-"""The planners of Klipper, grblHAL and LinuxCNC as compiled loops; `replay_kernel` has Marlin and RepRapFirmware.
+"""The planners of Klipper and grblHAL as compiled loops; `replay_kernel` has Marlin and RepRapFirmware, `blend_kernel`
+LinuxCNC.
 
 Klipper (`klippy/toolhead.py`, `Move` and `LookAheadQueue`): everything in squared speeds; a corner is a circle through
 X, Y and Z that may not leave it by the junction deviation, extra axes (`extras/manual_stepper.py`, the extruder) bound
 the jump of their own ratio; a second, gentler look-ahead keeps part of every move for cruising.
 grblHAL (`planner.c`, `plan_buffer_line`): length, acceleration and corner over all axes, mm and degrees mixed.
-LinuxCNC (`src/emc/tp/tp.c`): moves with rotary or UVW words get parabolic blends only: two neighbours overlap, each on
-half its acceleration (`tcGetTangentialMaxAccel`), none faster than a triangle over its own length
-(`tpCalculateTriangleVel`), none blending from a speed that would leave the corner by more than G64 P
-(`tpComputeBlendVelocity`). Here the overlap is put end to end: half of each velocity in the middle of the blend.
 """
 
 import math
@@ -245,53 +242,3 @@ def _by_axis(limit: _F, unit: _F) -> float:
         if unit[j] != 0:
             value = min(value, abs(limit[j] / unit[j]))
     return value
-
-
-@njit(cache=True)
-def linuxcnc(
-    delta: _F,
-    linear: NDArray[np.bool_],
-    feed: _F,
-    inverse: NDArray[np.bool_],
-    stops: NDArray[np.bool_],
-    speed_limit: _F,
-    acceleration_limit: _F,
-    tolerance: float,
-) -> Law:
-    """Every row as LinuxCNC moves it, blends put end to end. XYZ lead, else the rotaries, else the filament (UVW)."""
-    n, columns = delta.shape
-    length, asked, nominal, acceleration, corner = np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
-    leader = np.zeros(n, np.int64)
-    direction = np.zeros((n, columns))
-    last = -1
-    for i in range(n):
-        size = np.zeros(3)
-        for j in range(columns):
-            if abs(delta[i, j]) > STILL:
-                size[0 if linear[j] else (2 if j == columns - 1 else 1)] += delta[i, j] ** 2
-        if size.sum() <= 0:
-            continue
-        leader[i] = 0 if size[0] > 0 else (1 if size[1] > 0 else 2)
-        d = math.sqrt(size[leader[i]])
-        length[i] = d
-        asked[i] = feed[i] * d if inverse[i] else feed[i]
-        v, a = asked[i], LARGEST
-        for j in range(columns):
-            r = abs(delta[i, j]) / d
-            if r > 0:
-                v = min(v, speed_limit[j] / r)
-                a = min(a, acceleration_limit[j] / r)
-            if (0 if linear[j] else (2 if j == columns - 1 else 1)) == leader[i]:
-                direction[i, j] = delta[i, j] / d
-        acceleration[i] = a / 2
-        nominal[i] = min(v, math.sqrt(acceleration[i] * d))
-        if last >= 0 and not stops[i] and leader[i] == leader[last]:
-            dot = min(1.0, max(-1.0, (direction[i] * direction[last]).sum()))
-            theta = 0.5 * math.acos(-dot)
-            v = min(nominal[i], nominal[last])
-            if math.cos(theta) > 0:
-                v = min(v, 2 * math.sqrt(min(acceleration[i], acceleration[last]) * tolerance / math.cos(theta)))
-            corner[i] = (v * math.sin(theta)) ** 2
-        last = i
-    entry, cruise, leave, duration = _trapezoids(length, nominal, acceleration, corner, np.zeros(n), stops, n + 1)
-    return length, asked, entry, cruise, leave, acceleration, duration

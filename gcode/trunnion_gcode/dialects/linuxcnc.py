@@ -6,16 +6,19 @@ travels are G1 as well. With G93 every move carries F, one over its minutes.
 """
 
 from trunnion_gcode.dialect import Dialect
-from trunnion_gcode.metrics import linear_first
+from trunnion_gcode.metrics import linear_then_filament
 from trunnion_gcode.planner import Planner
 
 TOLERANCE = 0.01
 """mm that corners may be rounded by."""
 
+SLOWEST = 0.1 / 60.0
+"""Units/s that G93 reads at least (`src/emc/rs274ngc/interp_inverse.cc`, inverse_time_rate_straight)."""
+
 DIALECT = Dialect(
     name="linuxcnc",
-    metric=linear_first,
-    planner=Planner("blend", tolerance=TOLERANCE),
+    metric=linear_then_filament,
+    planner=Planner("blend", slowest=SLOWEST, tolerance=TOLERANCE),
     inverse_time=True,
     relative_extrusion=False,
     extruder="U",
