@@ -210,13 +210,20 @@ def test_nothing_is_missed_against_a_dense_oracle(kind: int) -> None:
 
 
 @pytest.mark.parametrize("name", shipped_profiles())
-def test_a_shipped_machine_is_free_at_home_and_at_zero(name: str) -> None:
-    """What touches while the machine merely stands there is a wrong profile, or is missing from `touches`."""
+def test_a_shipped_machine_is_free_at_home_and_turns_all_the_way_with_the_head_away(name: str) -> None:
+    """What touches while nothing is near the part is a wrong profile, or is missing from `touches`."""
     profile = load_profile(name)
-    home = profile.array("home")
-    up = home.copy()
+    away = profile.array("home")
+    turned = np.clip(profile.array("max"), None, 2 * np.pi), np.clip(profile.array("min"), -2 * np.pi, None)
     for j, joint in enumerate(profile.joints):
         if not joint.rotary and abs(joint.axis[2]) > 0.9:
-            up[j] = home[j] if abs(home[j]) > 50 else (joint.max if joint.side == "tool" else joint.min)
-    found = names_hit(profile, Motion(np.stack([home, up, home]), np.zeros(3)))
+            away[j] = joint.max
+    poses = [profile.array("home"), away]
+    for first in turned:
+        for second in turned:
+            pose = away.copy()
+            for j, ends in zip(profile.rotary, (first, second), strict=False):
+                pose[j] = ends[j]
+            poses += [pose, away]
+    found = names_hit(profile, Motion(np.stack(poses), np.zeros(len(poses))))
     assert found == {}
