@@ -6,7 +6,8 @@ program finds the cheapest sequence of states, where a step costs
 
     time x (2 while extruding) + 0.001 x turning time of the rotaries + 3 for a rewind   (s)
 
-and 0.001 in each free row in which rotary 1 has already turned to an angle that only the rows after the stretch need.
+and 0.001 for each travel within a free stretch that is begun with rotary 1 already at an angle that only the rows after
+the stretch need.
 `time` is the least in which every joint at its top speed, and the tip at the wanted speed, can make the step. A step is
 a *rewind* where it turns the tool through much more than the way between the two tool axes: the tool then leaves the
 part's surface in between, so it belongs into a travel with the nozzle lifted. A row that extrudes may be one only where
@@ -30,7 +31,7 @@ TURNING_WEIGHT = 1e-3
 """Cost of a second of turning that costs no time: of equal ways the one that turns least."""
 
 EARLY_COST = 1e-3
-"""s a row. Over planar layers the platter keeps still and turns shortly before it must, not at the first chance."""
+"""s a travel. Over planar layers the platter keeps still and turns shortly before it must, not at the first chance."""
 
 REWIND_COST = 3.0
 """s. Retract, leave, return and prime, besides the motion itself."""
@@ -38,14 +39,17 @@ REWIND_COST = 3.0
 STRAY = 0.01
 """rad that the tool may sweep in a step beyond three times the angle between the two tool axes before it is a jump."""
 
-ENOUGH_WINDINGS = 5
-"""From so many windings on, the path is first sought without limits, where only the nearest winding matters."""
-
 MOST_WINDINGS = 128
-"""Windings kept as states where a path does run into the limits of a joint with more."""
+"""Windings kept as states. With more, the path is first sought without limits: there the nearest winding is enough."""
+
+FIRST_SOURCES = 1 << 16
+"""States whose source is remembered before more room is taken."""
 
 SPARE_ANGLES = 16
 """Angles of the free rotary tried at the pole where those of its neighbours bring a linear joint past its limit."""
+
+ANGLES_APART = np.radians(0.1)
+"""rad. Of two angles closer than this one is enough at the pole; the difference takes no time worth speaking of."""
 
 POLE_ANGLE = 1e-8
 """rad to the pole below which rotary 1 is free without any tolerance: rounding of a tool axis meant to be vertical."""
@@ -131,8 +135,8 @@ def _dynamic_program(
     from trunnion_kinematics.choice_kernels import choice_kernel
 
     points, tool_axes = np.array(points, dtype=np.float64), np.array(tool_axes, dtype=np.float64)
-    w1, w2 = chain.rotary_axes
-    sine = np.linalg.norm(np.cross(tool_axes, w1), axis=1)
+    w2 = chain.rotary_axes[1]
+    sine = chain.pole_sine(tool_axes)
     sine2 = float(np.linalg.norm(np.cross(w2, chain.tool_axis)))
     step = np.zeros(len(points))
     step[1:] = np.linalg.norm(np.diff(tool_axes, axis=0), axis=1)
@@ -155,11 +159,11 @@ def _dynamic_program(
     for spare in (0, SPARE_ANGLES):
         offset, run, anchors, early = _anchors(chain, points, tool_axes, free, rest, spare)
         candidates, usable = _candidates(chain, profile, points, tool_axes, offset, run, anchors)
-        for windings in _windings_to_try(exact):
+        for windings in _windings_to_try(exact, turns):
             joints, jump = np.empty((len(points), len(at))), np.zeros(len(points), dtype=np.bool_)
             states = int(np.maximum(windings, 1).prod())
             short = states * int(np.diff(offset).max()) <= np.iinfo(np.int16).max
-            pointer = np.empty(offset[-1] * states, dtype=np.int16 if short else np.int32)
+            pointer = np.empty(FIRST_SOURCES, dtype="int16" if short else "int32")
             failed = choice_kernel(
                 chain.constants[1],
                 candidates,
@@ -188,9 +192,9 @@ def _dynamic_program(
     raise unreachable(chain, profile, max(failed, 0), points, tool_axes)
 
 
-def _windings_to_try(exact: IntArray) -> list[IntArray]:
-    """Joints of many windings are first taken without limits: a path that stays inside them is then the best."""
-    loose = np.where(exact >= ENOUGH_WINDINGS, 0, exact)
+def _windings_to_try(exact: IntArray, turns: FloatArray) -> list[IntArray]:
+    """Joints of very many windings are first taken without limits: a path that stays inside them is then the best."""
+    loose = np.where(turns > MOST_WINDINGS, 0, exact)
     return [loose] if (loose == exact).all() else [loose, exact]
 
 
@@ -215,7 +219,7 @@ def _free_rows(chain: JointChain, tool_axes: FloatArray, axis_tolerance: float) 
     """(n,) whether any angle of rotary 1 keeps the tool within the tolerance, which is so close to the pole only."""
     w1, w2 = chain.rotary_axes
     along = tool_axes @ w1
-    across = np.linalg.norm(np.cross(tool_axes, w1), axis=1)
+    across = chain.pole_sine(tool_axes)
     tolerance = max(axis_tolerance, POLE_ANGLE)
     apart, to_tool = np.arccos(np.clip(w1 @ w2, -1, 1)), np.arccos(np.clip(w2 @ chain.tool_axis, -1, 1))
     tilt = np.arctan2(across, along)
@@ -227,7 +231,7 @@ def _anchors(
     chain: JointChain, points: FloatArray, tool_axes: FloatArray, free: BoolArray, rest: float, spare: int
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
     """Where each row's candidates lie (n + 1,), the row's run of free rows or -1 (n,), angles of each run and their
-    price a row, (r, a).
+    price a travel, (r, a).
 
     The angles of rotary 1 worth having in a run of free rows: those of the rows on either side, in both branches, and
     that at rest.
@@ -244,8 +248,10 @@ def _anchors(
     angles[:, 4] = np.pi - (np.pi - rest) % (2 * np.pi)
     known = angles[:, [0, 1, 4]]
     angles[:, 5:] = rest + np.linspace(-np.pi, np.pi, spare, endpoint=False)
-    angles.sort(axis=1)
-    angles[:, 1:][np.diff(angles, axis=1) < POLE_ANGLE] = np.nan
+    wanted = [0, 1, 4, 2, 3, *range(5, 5 + spare)]
+    for place, column in enumerate(wanted):
+        apart = np.mod(angles[:, wanted[:place]] - angles[:, [column]] + np.pi, 2 * np.pi) - np.pi
+        angles[(np.abs(apart) < ANGLES_APART).any(axis=1), column] = np.nan
     angles.sort(axis=1)
     count = np.full(n, 2)
     count[free] = np.isfinite(angles).sum(axis=1)[run[free]]

@@ -89,6 +89,14 @@ class JointChain:
         """What the kernels read, laid out as `constants.py` says; only on a machine with rotary joints."""
         return chain_constants(self)
 
+    def pole_sine(self, tool_axes: FloatArray) -> FloatArray:
+        """(n,) sine of the angle between unit tool_axes (n, 3) and the axis of rotary 1, exact near the pole, too."""
+        w1 = self.rotary_axes[0]
+        aside = np.cross(w1, np.eye(3)[int(np.argmin(np.abs(w1)))])
+        aside /= np.linalg.norm(aside)
+        across = tool_axes @ np.stack([aside, np.cross(w1, aside)], axis=1)
+        return np.asarray(np.hypot(across[:, 0], across[:, 1]))
+
     def forward(self, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Where joints (n, k) in mm and rad put the tip, (n, 3) mm, and the tool, (n, 3) unit, in `part`."""
         joints = _rows(joints, len(self.letters))

@@ -69,7 +69,7 @@ def tube(
     sine = float(np.linalg.norm(np.cross(w1, w2)))
     f2 = float(np.arccos(np.clip(w2 @ chain.tool_axis, -1, 1)))
     k1 = tool_axes @ w1
-    r = np.maximum(np.linalg.norm(np.cross(tool_axes, w1), axis=1), 1e-300)
+    r = np.maximum(chain.pole_sine(tool_axes), 1e-300)
     from_pole = np.arcsin(np.minimum(r, 1.0)) / axis_tolerance
     tolerance = axis_tolerance * np.clip((NO_TOLERANCE - from_pole) / (NO_TOLERANCE - FULL_TOLERANCE), 0, 1)
 

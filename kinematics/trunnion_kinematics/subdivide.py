@@ -167,7 +167,7 @@ def _middle_joints(
     crossing = ((ends[:, :, rotary[1]] - pole) > 0).sum(axis=0) == 1
     margin = np.where(crossing, 0.0, MARGIN + 0.25 * (high - low))
     belongs = (joints[:, rotary[0]] >= low - margin) & (joints[:, rotary[0]] <= high + margin)
-    belongs &= np.linalg.norm(np.cross(tool_axes, chain.rotary_axes[0]), axis=1) > POLE_ANGLE
+    belongs &= chain.pole_sine(tool_axes) > POLE_ANGLE
     other = ~belongs
     joints[other] = chain.at_angles(points[other], guide[other][:, rotary])
     tool_axes[other] = chain.forward(joints[other])[1]

@@ -99,7 +99,7 @@ def joint_states(chain: JointChain, poses: Poses) -> FloatArray:
     states = chain.inverse(poses.points, poses.tool_axes)
     if not chain.rotary.size:
         return states
-    free = np.flatnonzero(np.linalg.norm(np.cross(poses.tool_axes, chain.rotary_axes[0]), axis=1) < POLE_SINE)
+    free = np.flatnonzero(chain.pole_sine(poses.tool_axes) < POLE_SINE)
     if not free.size:
         return states
     more = np.full((len(_FREE_ANGLES), *states.shape[1:]), np.nan)

@@ -40,8 +40,9 @@ def assert_valid(chain, machine, choice, points, tool_axes):
 class Exhaustive:
     """Every sequence of states of a short path, priced as the docstring of `branches` says."""
 
-    def __init__(self, chain, machine, points, tool_axes, travel, start):
+    def __init__(self, chain, machine, points, tool_axes, travel, start, speed=np.inf):
         self.chain, self.machine, self.travel, self.start = chain, machine, travel, start
+        self.floor = np.append(0, np.linalg.norm(np.diff(points, axis=0), axis=1)) / speed
         w1, w2 = chain.rotary_axes
         self.sine = np.linalg.norm(np.cross(tool_axes, w1), axis=1)
         self.sine2 = np.linalg.norm(np.cross(w2, chain.tool_axis))
@@ -79,8 +80,8 @@ class Exhaustive:
         return np.array(states)
 
     def ahead(self, i, state):
-        """What it costs in row i at the pole to have turned already to an angle that only later rows need."""
-        if i not in self.known:
+        """What it costs to begin a travel i at the pole at an angle that only later rows need."""
+        if not (i > 0 and self.travel[i] and i in self.known and i - 1 in self.known):
             return 0
         apart = np.mod(self.known[i] - state[self.chain.rotary[0]] + np.pi, TURN) - np.pi
         return 0 if np.abs(apart).min() < 1e-7 else EARLY_COST
@@ -92,16 +93,18 @@ class Exhaustive:
         sweep = 0.5 * (self.sine[i] + self.sine[i - 1]) * turn1 + self.sine2 * turn2
         jumps = sweep > self.sweep_limit[i]
         price = (
-            move.max() * (1 if self.travel[i] else EXTRUDING_WEIGHT) + TURNING_WEIGHT * move[self.chain.rotary].sum()
+            max(move.max(), self.floor[i]) * (1 if self.travel[i] else EXTRUDING_WEIGHT)
+            + TURNING_WEIGHT * move[self.chain.rotary].sum()
         )
-        return price + (REWIND_COST if jumps else 0) + self.ahead(i, after), jumps
+        return price + (REWIND_COST if jumps else 0) + self.ahead(i, before), jumps
 
     def opening(self, state):
         move = np.abs(state - (0 if self.start is None else self.start)) / self.machine.array("speed")
         turning = TURNING_WEIGHT * move[self.chain.rotary].sum()
-        return self.ahead(0, state) + turning + (0 if self.start is None else move.max())
+        return turning + (0 if self.start is None else move.max())
 
-    def best(self):
+    def prices(self):
+        """A table of prices for every step, inf where a step is barred."""
         prices, alive = [], np.ones(len(self.states[0]), dtype=bool)
         for i in range(1, len(self.states)):
             table = [[self.step(i, a, b) for b in self.states[i]] for a in self.states[i - 1]]
@@ -112,6 +115,17 @@ class Exhaustive:
                 barred[alive] = False
             alive = ~barred.all(axis=0)
             prices.append(np.where(barred, np.inf, price))
+        return prices
+
+    def best_by_rows(self):
+        """The same by a plain dynamic program, one full table a row, for paths too long for every sequence."""
+        value = np.array([self.opening(state) for state in self.states[0]])
+        for price in self.prices():
+            value = (value[:, None] + price).min(axis=0)
+        return value.min()
+
+    def best(self):
+        prices = self.prices()
         opening = [self.opening(state) for state in self.states[0]]
         return min(
             opening[path[0]] + sum(prices[i][path[i], path[i + 1]] for i in range(len(prices)))
@@ -154,6 +168,29 @@ def test_exhaustive_search_agrees_where_a_narrow_machine_must_rewind(make_profil
     search = Exhaustive(chain, machine, points, tool_axes, travel, None)
     assert_valid(chain, machine, choice, points, tool_axes)
     assert search.price_of(choice.joints) == pytest.approx(search.best(), rel=1e-9)
+
+
+@pytest.mark.parametrize("speed", [np.inf, 25.0])
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("name", ["finite_platter", "yaw_head", "tilt_then_platter", "cradle"])
+def test_rows_that_glide_cost_what_a_full_table_a_row_says(machines, name, seed, speed):
+    """Long paths of planar and leaning stretches, of even and of uneven rows, with few and with many windings."""
+    rng = np.random.default_rng([seed, 7])
+    machine = machines[name]
+    chain = JointChain.from_profile(machine)
+    n = 48
+    lean = np.repeat(rng.permutation([0.0, 0.5, 0.0, 0.3]), n // 4)
+    bearing = np.cumsum(np.repeat(rng.normal(0, 0.6, 4), n // 4) + rng.normal(0, 0.1, n))
+    even = seed % 2 == 0
+    steps = np.where(even, 0.4, rng.exponential(2, n))[:, None] * leaning(bearing, np.full(n, np.pi / 2))
+    points, tool_axes = np.cumsum(steps, axis=0), leaning(bearing, lean)
+    travel = every(n, 11)
+    start = None if seed < 2 else np.zeros(5)
+    speeds = None if np.isinf(speed) else np.full(n, speed)
+    choice = choose(chain, machine, points, tool_axes, travel=travel, start=start, speed=speeds)
+    assert_valid(chain, machine, choice, points, tool_axes)
+    search = Exhaustive(chain, machine, points, tool_axes, travel, start, speed)
+    assert search.price_of(choice.joints) == pytest.approx(search.best_by_rows(), rel=1e-9)
 
 
 def test_all_machines_follow_the_same_path(machine):
