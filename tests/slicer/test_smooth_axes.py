@@ -5,11 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
-from trunnion import samples
-from trunnion_core.roles import Role
-from trunnion_core.settings import PrintSettings
 from trunnion_slicer.nonplanar.fair import FAIRING, faired, refined
-from trunnion_slicer.nonplanar.plan import plan_nonplanar
 from trunnion_slicer.nonplanar.project import Lifted
 from trunnion_slicer.nonplanar.smooth import smoothed
 
@@ -123,26 +119,3 @@ def test_refined_paths_lay_the_same_at_the_same_places() -> None:
     step = np.linalg.norm(np.diff(fine.points, axis=0), axis=1)
     step[fine.starts[1] - 1] = 0.0
     assert step.max() <= 0.4 + 1e-12
-
-
-@pytest.mark.parametrize("name", ["freeform", "propeller"])
-def test_samples_ask_their_rotaries_for_less_than_a_third(name: str) -> None:
-    peaks = {}
-    for tolerance in (0.0, 2.0):
-        settings = PrintSettings(**samples.settings(name) | {"nonplanar_smoothing": tolerance})
-        plan = plan_nonplanar(samples.make(name), settings)
-        assert plan is not None
-        beads = [
-            bead for layer in plan.layers for bead in layer.beads if bead.role != Role.TRAVEL and len(bead.points) > 2
-        ]
-        peaks[tolerance] = max(_peak(bead.points, bead.tool_axes) for bead in beads)
-    assert peaks[2.0] < 0.33 * peaks[0.0]
-
-
-def _peak(points: np.ndarray, axes: np.ndarray) -> float:
-    """Greatest bending away from corners of the path, where the tip slows down for the corner's own sake."""
-    step = np.diff(points, axis=0)
-    length = np.linalg.norm(step, axis=1)
-    cosine = (step[1:] * step[:-1]).sum(axis=1) / (length[1:] * length[:-1])
-    inner = (cosine > np.cos(np.radians(15))) & (np.minimum(length[1:], length[:-1]) > 0.02)
-    return float(bending(points, axes)[inner].max(initial=0.0))

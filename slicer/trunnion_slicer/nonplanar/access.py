@@ -22,7 +22,7 @@ from trunnion_core.solid_tables import SolidTable
 from trunnion_slicer.nonplanar.head import frusta
 from trunnion_slicer.nonplanar.material import Material, material, spread_points
 from trunnion_slicer.nonplanar.normals import face_normals
-from trunnion_slicer.nonplanar.orient import corner_normals
+from trunnion_slicer.nonplanar.orient import corner_normals, inherited
 from trunnion_slicer.nonplanar.patch import split_patches
 from trunnion_slicer.nonplanar.regions import worthwhile
 from trunnion_slicer.nonplanar.split import split_edges
@@ -78,6 +78,8 @@ class Reach:
     """(m,) the face of the input mesh that every face lies on."""
     region: BoolArray
     """(m,) reachable faces worth printing non-planar."""
+    normals: FloatArray
+    """(m, 3, 3) unit: where the tool stands at the corners of the region's faces, as on the input mesh; 0 elsewhere."""
     findings: tuple[Finding, ...]
     scene: "Scene | None"
     """What stands around the region, to try other poses in; None without bodies or a region."""
@@ -95,17 +97,18 @@ def reachable(
     check_array("region", region, (len(mesh.faces),))
     bodies = frusta(head)
     parent = np.arange(len(mesh.faces))
+    whole, normals = mesh.triangles, corner_normals(mesh, region)
     if not len(bodies) or not region.any():
-        return Reach(mesh, parent, region, (), None)
+        return Reach(mesh, parent, region, normals, (), None)
     before = footprints_of(mesh, region).sum()
     scene = None
     lost = np.zeros(len(bodies))
     worst = np.full(len(bodies), np.inf)
     where = np.zeros((len(bodies), 3))
     for _ in range(ROUNDS):
-        scene = Scene(mesh, region, settings, bodies, (layers - 1) * settings.layer_height)
+        scene = Scene(mesh, region, settings, bodies, (layers - 1) * settings.layer_height, whole, normals)
         mesh, region, parent = _split_mixed(scene, mesh, region, parent)
-        clearance, body = _at_corners(scene, mesh, region)
+        clearance, body = _at_corners(scene, mesh, region, parent)
         if clearance.min() >= -SLACK:
             break
         face, corner = np.nonzero(clearance < 0)
@@ -125,16 +128,25 @@ def reachable(
         _blocked(head[number].name, float(lost[number]), before, float(worst[number]), where[number])
         for number in np.flatnonzero(lost > 0).tolist()
     )
-    return Reach(mesh, parent, region, findings, scene)
+    assert scene is not None
+    return Reach(mesh, parent, region, scene.tool_axes(mesh, region, parent), findings, scene)
 
 
 class Scene:
     """The part as it stands around a region, and the bodies that must not enter it."""
 
     def __init__(
-        self, mesh: Mesh, region: BoolArray, settings: PrintSettings, bodies: FloatArray, depth: float
+        self,
+        mesh: Mesh,
+        region: BoolArray,
+        settings: PrintSettings,
+        bodies: FloatArray,
+        depth: float,
+        whole: FloatArray,
+        normals: FloatArray,
     ) -> None:
         self.bodies = bodies
+        self.whole, self.normals = whole, normals
         self.depth = depth
         self.upright = settings.nonplanar_tool_axis == "vertical"
         self.skin: Material = material(mesh.vertices, mesh.faces, settings.extrusion_width / 2)
@@ -146,6 +158,13 @@ class Scene:
         walls = self._walls(mesh, region)
         self.sinks[walls] = 1.0
         self.margins[walls] = MARGIN
+
+    def tool_axes(self, mesh: Mesh, region: BoolArray, parent: IntArray) -> FloatArray:
+        """(m, 3, 3) unit at the corners of the region's faces, each a part of an input face; 0 elsewhere."""
+        axes = np.zeros((len(mesh.faces), 3, 3))
+        whole = parent[region]
+        axes[region] = inherited(mesh.triangles[region], self.whole[whole], self.normals[whole])
+        return axes
 
     def _walls(self, mesh: Mesh, region: BoolArray) -> IntArray:
         """Points that are no skin, but rise and fall with it: tops of walls that end at its border."""
@@ -201,24 +220,23 @@ class Scene:
         return gap, body
 
 
-def _poses(mesh: Mesh, region: BoolArray, *, upright: bool) -> tuple[FloatArray, FloatArray]:
+def _poses(scene: Scene, mesh: Mesh, region: BoolArray, parent: IntArray) -> tuple[FloatArray, FloatArray]:
     """Tool axes and inward steps (m, 3, 3) at the corners of the region's faces; zero elsewhere."""
-    axes = np.zeros((len(mesh.faces), 3, 3))
+    axes = scene.tool_axes(mesh, region, parent)
     steps = np.zeros((len(mesh.faces), 3, 3))
     for patch in split_patches(mesh, region, _twin(mesh)):
-        axes[patch.rows] = corner_normals(patch)
         steps[patch.rows] = patch.steps[patch.faces]
-    if upright:
+    if scene.upright:
         axes[:] = (0.0, 0.0, 1.0)
     return axes, steps
 
 
-def _at_corners(scene: Scene, mesh: Mesh, region: BoolArray) -> tuple[FloatArray, IntArray]:
+def _at_corners(scene: Scene, mesh: Mesh, region: BoolArray, parent: IntArray) -> tuple[FloatArray, IntArray]:
     """Clearance and nearest body (m, 3) at the corners of the region's faces; NEAR and 0 elsewhere.
 
     A corner shared by faces that hold the tool differently (a crease) has the least clearance of them all.
     """
-    axes, steps = _poses(mesh, region, upright=scene.upright)
+    axes, steps = _poses(scene, mesh, region, parent)
     clearance = np.full((len(mesh.faces), 3), NEAR)
     body = np.zeros((len(mesh.faces), 3), np.int64)
     corner = mesh.faces[region].ravel()
@@ -251,7 +269,7 @@ def _tested_once(tips: FloatArray, axes: FloatArray) -> tuple[IntArray, IntArray
 
 def _split_mixed(scene: Scene, mesh: Mesh, region: BoolArray, parent: IntArray) -> tuple[Mesh, BoolArray, IntArray]:
     """Split faces that are reachable in one place and not in another, until their edges are at most FINE long."""
-    axes, steps = _poses(mesh, region, upright=scene.upright)
+    axes, steps = _poses(scene, mesh, region, parent)
     suspect = region.copy()
     for _ in range(SPLITS):
         length = np.linalg.norm(np.roll(mesh.triangles, -1, axis=1) - mesh.triangles, axis=2)
@@ -271,7 +289,7 @@ def _split_mixed(scene: Scene, mesh: Mesh, region: BoolArray, parent: IntArray) 
         changed = np.bincount(came, minlength=len(mesh.faces)) > 1
         mesh, region, parent = Mesh(vertices, faces), region[came], parent[came]
         suspect = region & (touched | (changed & suspect))[came]
-        axes, steps = _poses(mesh, region, upright=scene.upright)
+        axes, steps = _poses(scene, mesh, region, parent)
     return mesh, region, parent
 
 

@@ -14,18 +14,20 @@ from trunnion_core.layers import Bead, Layer
 from trunnion_core.settings import PrintSettings
 from trunnion_slicer.nonplanar.clear import kept_clear
 from trunnion_slicer.nonplanar.fair import faired, refined
-from trunnion_slicer.nonplanar.field import even_axes
+from trunnion_slicer.nonplanar.field import even_axes, normals_at
 from trunnion_slicer.nonplanar.footprint import footprint
 from trunnion_slicer.nonplanar.grid import Grid, build_grid
 from trunnion_slicer.nonplanar.offset import Surfaces
-from trunnion_slicer.nonplanar.orient import corner_normals
 from trunnion_slicer.nonplanar.paths import FlatPath, flat_paths
-from trunnion_slicer.nonplanar.project import Lifted, lift
+from trunnion_slicer.nonplanar.project import AXIS_CHORD, Lifted, lift
 from trunnion_slicer.nonplanar.smooth import into_cone, smoothed
 from trunnion_slicer.nonplanar.stairs import gap_over_stairs
 
 if TYPE_CHECKING:
-    from trunnion_slicer.nonplanar.access import Scene
+    from trunnion_slicer.nonplanar.access import Reach
+
+BETWEEN_DEG = 0.05
+"""Degrees of the smoothing's cone kept for the way between two rows, where axis and normal turn unequally."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +53,11 @@ def sheet(stack: Surfaces, layer: int) -> Sheet:
     return Sheet(stack, layer, grid, footprint(surface, stack.patch.border, grid))
 
 
-def beads_of(on: Sheet, planar: Sequence[Layer], settings: PrintSettings, scene: "Scene | None" = None) -> list[Bead]:
+def beads_of(on: Sheet, planar: Sequence[Layer], settings: PrintSettings, reach: "Reach") -> list[Bead]:
     """Every bead of a layer on one patch: walls, then infill. The lowest layer lies on the beads of `planar`.
 
-    Smoothed tool axes keep the head out of what stands in the `scene`.
+    The patch is one of the region of `reach`, whose normals the tool follows; where they are smoothed it keeps clear of
+    the scene there.
     """
     paths = flat_paths(on.stack, on.layer, on.outline, settings)
     if not paths:
@@ -64,23 +67,36 @@ def beads_of(on: Sheet, planar: Sequence[Layer], settings: PrintSettings, scene:
     lines = [path.points for path in paths]
     lowest = on.layer == on.stack.layers - 1
     stairs = gap_over_stairs(on.stack, planar, settings) if lowest else None
-    normals = corner_normals(on.stack.patch)
+    normals = reach.normals[on.stack.patch.rows]
     lifted = lift(lines, on.grid, normals, density[faces], settings.extrusion_width, stairs)
     axes = lifted.axes
     if settings.nonplanar_smoothing > 0 and settings.nonplanar_tool_axis == "normal":
-        lifted = refined(lifted)
-        cone = float(np.radians(settings.nonplanar_smoothing))
-        wanted = into_cone(even_axes(lifted.points, on.grid, normals, cone), lifted.axes, cone)
-        axes = smoothed(lifted.points, lifted.axes, wanted, lifted.starts, cone)
-        if scene is not None:
-            gap = partial(scene.gap, depth=on.layer * settings.layer_height)
-            axes = kept_clear(lifted.points, axes, lifted.axes, lifted.starts, gap)
+        lifted = _exact_normals(refined(lifted), on.grid, normals)
+        axes = _smoothed(lifted, on, normals, reach, settings)
         lifted = replace(lifted, points=faired(lifted.points, lifted.starts))
     height = _thickness(lifted) if lowest else np.full(len(axes), settings.layer_height)
     if settings.nonplanar_tool_axis == "vertical":
         height = height / np.maximum(lifted.axes[:, 2], 0.1)
         axes = np.tile([0.0, 0.0, 1.0], (len(axes), 1))
     return _beads(paths, lifted, axes, height)
+
+
+def _exact_normals(lifted: Lifted, grid: Grid, normals: FloatArray) -> Lifted:
+    """The paths with the surface's own normals where thinning left others; not where the tool turns at a crease."""
+    exact, _ = normals_at(lifted.points[:, :2], grid, normals)
+    thinned = np.linalg.norm(exact - lifted.axes, axis=1) < 2 * AXIS_CHORD
+    return replace(lifted, axes=np.where(thinned[:, None], exact, lifted.axes))
+
+
+def _smoothed(lifted: Lifted, on: Sheet, normals: FloatArray, reach: "Reach", settings: PrintSettings) -> FloatArray:
+    """Tool axes (n, 3) unit within `nonplanar_smoothing` of the paths' normals, no nearer to the part than these."""
+    cone = float(np.radians(max(settings.nonplanar_smoothing - BETWEEN_DEG, 0.0)))
+    wanted = into_cone(even_axes(lifted.points, on.grid, normals, cone), lifted.axes, cone)
+    axes = smoothed(lifted.points, lifted.axes, wanted, lifted.starts, cone)
+    if reach.scene is None:
+        return axes
+    gap = partial(reach.scene.gap, depth=on.layer * settings.layer_height)
+    return kept_clear(lifted.points, axes, lifted.axes, lifted.starts, gap)
 
 
 def _thickness(lifted: Lifted) -> FloatArray:

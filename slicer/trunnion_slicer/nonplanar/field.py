@@ -30,7 +30,7 @@ ROUNDS = 15
 BEYOND = 1e-3
 """Weight of the nearest normal at nodes beside the surface, where the field only goes on."""
 ON_SURFACE = 1e-6
-"""mm. A node nearer than this to a triangle is over it."""
+"""mm. A point nearer than this to a triangle is over it."""
 STENCILS = (
     ((-1, 0, 1.0), (0, 0, -2.0), (1, 0, 1.0)),
     ((0, -1, 1.0), (0, 0, -2.0), (0, 1, 1.0)),
@@ -52,18 +52,26 @@ def even_axes(points: FloatArray, grid: Grid, corner_normals: FloatArray, tolera
     low = np.floor(place.min(axis=0)).astype(np.int64) - 1
     cell = np.floor(place).astype(np.int64) - low
     node = _nodes(cell)
-    where = (np.argwhere(node >= 0) + low) * CELL
-    triangle, weights = grid.locate(where)
-    there = np.einsum("nk,nkd->nd", weights, grid.triangles[triangle][:, :, :2])
-    over = np.linalg.norm(there - where, axis=1) < ON_SURFACE
-    normals = np.einsum("nk,nkd->nd", weights, corner_normals[triangle])
-    axes = _plate(node, normals / np.linalg.norm(normals, axis=1, keepdims=True), over, SHARE * tolerance)
+    normals, over = normals_at((np.argwhere(node >= 0) + low) * CELL, grid, corner_normals)
+    axes = _plate(node, normals, over, SHARE * tolerance)
     share = place - low - cell
     result = np.zeros((len(points), 3))
     for i, along_x in ((0, 1 - share[:, 0]), (1, share[:, 0])):
         for j, along_y in ((0, 1 - share[:, 1]), (1, share[:, 1])):
             result += (along_x * along_y)[:, None] * axes[node[cell[:, 0] + i, cell[:, 1] + j]]
     return np.asarray(result / np.linalg.norm(result, axis=1, keepdims=True))
+
+
+def normals_at(points: FloatArray, grid: Grid, corner_normals: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Normals (n, 3) unit, interpolated over the facet under each point (n, 2), and whether there is one (n,).
+
+    Beside the surface the normal is the nearest one.
+    """
+    triangle, weights = grid.locate(points)
+    there = np.einsum("nk,nkd->nd", weights, grid.triangles[triangle][:, :, :2])
+    over = np.linalg.norm(there - points, axis=1) < ON_SURFACE
+    normals = np.einsum("nk,nkd->nd", weights, corner_normals[triangle])
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True), over
 
 
 def _nodes(cell: IntArray) -> IntArray:

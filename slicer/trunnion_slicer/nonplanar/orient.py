@@ -7,9 +7,9 @@ are nearly parallel to its own, and along a path that crosses the crease the too
 
 import numpy as np
 
-from trunnion_core.arrays import FloatArray, IntArray
-from trunnion_slicer.nonplanar.normals import corner_angles, face_normals
-from trunnion_slicer.nonplanar.patch import Patch
+from trunnion_core.arrays import BoolArray, FloatArray, IntArray
+from trunnion_core.mesh import Mesh
+from trunnion_slicer.nonplanar.normals import corner_angles, face_normals, mean_normals
 
 CREASE_DEG = 20.0
 """Degrees between facets from which on each keeps its own normal at their common corner."""
@@ -18,32 +18,56 @@ CREASE_JUMP = 0.035
 """Two degrees: a larger step of the tool axis at a point is spread over the path before and behind it."""
 
 
-def corner_normals(patch: Patch) -> FloatArray:
-    """(m, 3, 3) unit: at every corner the angle-weighted mean of the normals within CREASE_DEG of its facet's."""
-    faces = patch.faces
-    normal, _ = face_normals(patch.vertices, faces)
-    corners = patch.normals[faces]
-    off = (corners * normal[:, None]).sum(axis=2) < np.cos(np.radians(CREASE_DEG / 2))
-    creased = np.zeros(len(patch.vertices), np.bool_)
-    creased[faces[off]] = True
+def corner_normals(mesh: Mesh, region: BoolArray) -> FloatArray:
+    """(m, 3, 3) unit: at every corner of the region's faces the mean, weighted by angle, of the normals around it that
+    are within CREASE_DEG of its face's; 0 elsewhere.
+
+    Faces beyond the border of the region (m,) count as well: where it ends says nothing about the surface.
+    """
+    faces = mesh.faces
+    normal, _ = face_normals(mesh.vertices, faces)
+    mean = mean_normals(mesh.vertices, faces)
+    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    corners = np.where(region[:, None, None], mean[faces], 0.0)
+    rows = np.flatnonzero(region)
+    off = (corners[rows] * normal[rows, None]).sum(axis=2) < np.cos(np.radians(CREASE_DEG / 2))
+    creased = np.zeros(len(mesh.vertices), np.bool_)
+    creased[faces[rows][off]] = True
     around = np.flatnonzero(creased[faces].ravel())
     if not around.size:
         return corners
     vertex = faces.ravel()[around]
     order = np.argsort(vertex, kind="stable")
     around, vertex = around[order], vertex[order]
-    first = np.searchsorted(vertex, vertex, side="left")
-    valence = np.searchsorted(vertex, vertex, side="right") - first
-    mine = np.repeat(np.arange(len(around)), valence)
-    other = first[mine] + np.arange(len(mine)) - np.repeat(np.cumsum(valence) - valence, valence)
-    mine_normal, other_normal = normal[around[mine] // 3], normal[around[other] // 3]
-    alike = (mine_normal * other_normal).sum(axis=1) >= np.cos(np.radians(CREASE_DEG))
-    weight = corner_angles(patch.vertices, faces).ravel()[around[other]] * alike
-    total = [np.bincount(mine, weight * other_normal[:, axis], len(around)) for axis in range(3)]
+    mine = np.flatnonzero(region[around // 3])
+    first = np.searchsorted(vertex, vertex[mine], side="left")
+    valence = np.searchsorted(vertex, vertex[mine], side="right") - first
+    pair = np.repeat(np.arange(len(mine)), valence)
+    other = around[first[pair] + np.arange(len(pair)) - np.repeat(np.cumsum(valence) - valence, valence)]
+    mine = around[mine]
+    alike = (normal[mine[pair] // 3] * normal[other // 3]).sum(axis=1) >= np.cos(np.radians(CREASE_DEG))
+    weight = corner_angles(mesh.vertices, faces).ravel()[other] * alike
+    total = [np.bincount(pair, weight * normal[other // 3, axis], len(mine)) for axis in range(3)]
     summed = np.stack(total, axis=1)
     corners = corners.reshape(-1, 3)
-    corners[around] = summed / np.linalg.norm(summed, axis=1, keepdims=True)
+    corners[mine] = summed / np.linalg.norm(summed, axis=1, keepdims=True)
     return corners.reshape(-1, 3, 3)
+
+
+def inherited(triangles: FloatArray, whole: FloatArray, normals: FloatArray) -> FloatArray:
+    """(m, 3, 3) unit: normals at the corners of triangles, each a part of one of `whole` with `normals`, all (m, 3, 3).
+
+    Cutting a face in pieces changes nothing about which way the tool stands on it.
+    """
+    side, other = whole[:, 1] - whole[:, 0], whole[:, 2] - whole[:, 0]
+    away = triangles - whole[:, :1]
+    across = np.cross(side, other)
+    size = np.maximum((across * across).sum(axis=1), 1e-300)[:, None]
+    second = (np.cross(away, other[:, None]) * across[:, None]).sum(axis=2) / size
+    third = (np.cross(side[:, None], away) * across[:, None]).sum(axis=2) / size
+    weights = np.clip(np.stack([1 - second - third, second, third], axis=2), 0.0, 1.0)
+    between = np.einsum("mck,mkd->mcd", weights, normals)
+    return np.asarray(between / np.maximum(np.linalg.norm(between, axis=2, keepdims=True), 1e-300))
 
 
 def spread_jumps(

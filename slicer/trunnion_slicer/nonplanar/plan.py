@@ -103,7 +103,7 @@ def plan_nonplanar(
     layers = []
     for depth in reversed(range(max(skin.stack.layers for skin in skins))):
         sheets = [skin if depth == 0 else sheet(skin.stack, depth) for skin in skins if skin.stack.layers > depth]
-        beads = tuple(bead for on in sheets for bead in beads_of(on, planar.layers, settings, reach.scene))
+        beads = tuple(bead for on in sheets for bead in beads_of(on, planar.layers, settings, reach))
         if beads:
             layers.append(Layer("nonplanar", max(on.top for on in sheets), settings.layer_height, beads))
     return NonplanarPlan(planar_mesh, planar, tuple(layers), region, tuple(findings))
