@@ -11,6 +11,7 @@ import numpy as np
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_sim import blends, motion_kernel, replay_kernel, toolhead_kernel
+from trunnion_sim.homing import homing_times
 from trunnion_sim.limits import Limits
 from trunnion_sim.merging import blocks_of, laws_of_rows
 from trunnion_sim.motion import Motion
@@ -92,6 +93,12 @@ def replay(motion: Motion, profile: MachineProfile, rules: Rules, limits: Limits
     length, asked, entry, cruise, leave, acceleration, duration = _law(
         motion, profile, rules, limits, delta, homing, stops
     )
+    if rules.homes_in_turn:
+        times = homing_times(motion, profile, limits, rules.first_move_delay)
+        rows = np.array(list(times), np.int64)
+        duration[rows] = list(times.values())
+        for speed in (entry, cruise, leave):
+            speed[rows] = np.divide(length[rows], duration[rows], out=np.zeros(len(rows)), where=duration[rows] > 0)
     before = np.where(np.isnan(motion.dwell), 0.0, motion.dwell)
     before += _first_moves(length, stops, homing) * rules.first_move_delay
     begin = np.cumsum(before + duration) - duration

@@ -39,6 +39,8 @@ class Rules:
     """mm/s; slower moves are sped up to this."""
     unseen_blocks: int = 0
     """Places of the planner's queue that the plan of a move can never count on when the move begins."""
+    homes_in_turn: bool = False
+    """Whether G28 homes one joint after the other, as `homing` says, and not all at once at full speed."""
     first_move_delay: float = 0.0
     """s that fewer than three moves after a standstill wait for company before they begin."""
     least_steps: int = 0

@@ -2,8 +2,10 @@
 
 from typing import TYPE_CHECKING
 
+from trunnion_sim import homing
 from trunnion_sim.firmware import planner_kernel as kernel
 from trunnion_sim.firmware.parser import Command
+from trunnion_sim.firmware.planner import FIRST_MOVE_DELAY
 from trunnion_sim.firmware.waits import Steps, Wait
 
 if TYPE_CHECKING:
@@ -11,8 +13,8 @@ if TYPE_CHECKING:
 
 LONGEST_DWELL = 4294967.295
 """s: what 32 bits of milliseconds hold."""
-HOMING_SPEED = 50.0
-"""mm/s and degrees/s, or half of what the joint can where that is less."""
+ENDSTOP_POLL = 0.001
+"""s between two looks at the endstops."""
 
 
 def dwell(machine: "SoftwareMachine", command: Command) -> Steps:
@@ -26,22 +28,42 @@ def dwell(machine: "SoftwareMachine", command: Command) -> Steps:
 
 
 def home(machine: "SoftwareMachine", command: Command) -> Steps:
-    """G28: drive the named joints, or all, to their endstops one after the other."""
+    """G28: drive the named joints, or all, to their endstops one after the other (`G28.cpp`, `homeaxis`)."""
     yield from synchronize(machine)
     motion, planner = machine.motion, machine.planner
-    named = [letter for letter in motion.letters if letter in command.words]
-    for letter in named or motion.letters:
-        column = motion.columns[letter]
-        goal = motion.joints
-        goal[column] = motion.home[column]
-        speed = min(HOMING_SPEED, 0.5 * float(planner.limits[kernel.MAX_SPEED, column]))
-        planner.add(goal, speed, 1.0, machine.line, machine.now)
+    for column in homing.homing_order(machine.profile, set(command.words)):
+        joint = machine.profile.joints[column]
+        end = motion.home[column]
+        here = motion.joints[column]
+        way = 1.0 if end > here or (end == here and end >= motion.high[column]) else -1.0
+        fast = homing.speed_of(joint, float(planner.limits[kernel.MAX_SPEED, column]))
+        yield from _to_endstop(machine, column, way, fast)
+        back = motion.joints
+        back[column] = end - way * homing.BACK.get(joint.letter, homing.BACK_OF_OTHERS)
+        planner.add(back, fast, 1.0, machine.line, machine.now)
         yield from synchronize(machine)
-        motion.stand_at(goal)
+        motion.stand_at(back)
+        yield from _to_endstop(machine, column, way, fast / homing.SLOWER.get(joint.letter, homing.SLOWER_OF_OTHERS))
         motion.shift[column] = 0.0
         motion.homed[column] = True
-        planner.set_joints(goal[:-1])
     machine.say(machine.position_report())
+
+
+def _to_endstop(machine: "SoftwareMachine", column: int, way: float, speed: float) -> Steps:
+    """Drive a joint on until its endstop is hit, where it stops at once."""
+    motion, planner = machine.motion, machine.planner
+    end = motion.home[column]
+    at, beyond = motion.joints, motion.joints
+    beyond[column] = end + way * (speed * speed / float(planner.limits[kernel.MAX_ACCELERATION, column]) + 1.0)
+    planner.add(beyond, speed, 1.0, machine.line, machine.now)
+    yield Wait(until=machine.now + FIRST_MOVE_DELAY)
+    per_unit = float(planner.limits[kernel.STEPS_PER_UNIT, column])
+    while planner.moves and (left := way * (end - planner.steps_now(machine.now)[column] / per_unit)) > 0:
+        yield Wait(until=machine.now + max(left / speed, ENDSTOP_POLL))
+    planner.stop(machine.now, machine.line)
+    at[column] = end
+    motion.stand_at(at)
+    planner.set_joints(at[:-1])
 
 
 def synchronize(machine: "SoftwareMachine", command: Command | None = None) -> Steps:

@@ -24,6 +24,7 @@ RULES = Rules(
     slowest=0.05,
     unseen_blocks=2,
     first_move_delay=0.1,
+    homes_in_turn=True,
     least_steps=6,
     shortest_linear=1e-3,
     advance_axes="XYZ",
