@@ -104,6 +104,14 @@ class Context:
             moved |= np.abs(np.diff(self.motion.path[:, column])) > 1e-9
         return moved
 
+    def surely_moved(self, column: int) -> FloatArray:
+        """(n,) mm or rad that a joint moves on each row at least.
+
+        A firmware that joins rows of a few motor steps to the rows around them turns each a little: so many steps less.
+        """
+        few = self.rules.least_steps / self.profile.joints[column].steps_per_unit
+        return np.maximum(np.abs(np.diff(self.motion.path[:, column])) - few, 0.0)
+
     @cached_property
     def homing(self) -> BoolArray:
         """(n,) whether the row is a homing."""
@@ -119,8 +127,8 @@ class Context:
     def feeds(self) -> BoolArray:
         """(n,) whether the row moves and lays plastic."""
         plastic = self.motion.filament > 0
-        if self.pressure is not None:
-            # Words that carry pressure advance may draw back while the bead goes on.
+        if self.rows.own_roles and self.pressure is not None:
+            # Words that carry pressure advance may draw back while the bead goes on; travels have a role of their own.
             plastic |= self.rows.bead & (self.laid > 0)
         return self.moved & ~self.homing & plastic
 

@@ -136,7 +136,7 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
     letters = np.array([ord(letter) for letter in profile.letters], np.int64)
     rotary = np.array([joint.rotary for joint in profile.joints])
     home = profile.array("home") * profile.to_shown
-    state = kernel.fresh_state(k)
+    state = kernel.fresh_state(k, profile.filament_area)
     store = RowStore(k)
     commands: list[Command] = []
     first_line: dict[tuple[str, int], int] = {}

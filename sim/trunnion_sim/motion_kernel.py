@@ -30,14 +30,18 @@ ARC_SEGMENT = 1.0
 ARC_TOLERANCE = 0.1
 """mm between the radii of the two ends of an arc: writers round I and J."""
 
-_REL, _EREL, _INCH, _INV, _E, _FEED, _SPEED, _FLOW, _HOMED, _DWELL, _FIRST = range(11)
+_REL, _EREL, _INCH, _INV, _E, _FEED, _SPEED, _FLOW, _HOMED, _DWELL, _AREA, _VOLUME, _FIRST = range(13)
 
 
-def fresh_state(k: int) -> NDArray[np.float64]:
-    """State before the first line: absolute, mm, standing at zero; positions and offsets follow the scalars."""
+def fresh_state(k: int, filament_area: float) -> NDArray[np.float64]:
+    """State before the first line: absolute, mm, standing at zero; positions and offsets follow the scalars.
+
+    `filament_area` mm² is what volumetric extrusion (M200 S1) takes the filament for until M200 D says otherwise.
+    """
     state = np.zeros(_FIRST + 2 * k)
     state[_SPEED] = 1.0
     state[_FLOW] = 1.0
+    state[_AREA] = filament_area
     return state
 
 
@@ -125,6 +129,12 @@ def execute(
                 state[_SPEED] = value[83] / 100
             elif c == 2210 and value[83] > 0:
                 state[_FLOW] = value[83] / 100
+            elif c == 2000:  # volumetric: E is mm³ of filament of that diameter
+                if value[68] >= 0:
+                    state[_AREA] = math.pi / 4 * value[68] ** 2
+                    state[_VOLUME] = value[68] > 0
+                if value[83] >= 0:
+                    state[_VOLUME] = value[83] > 0
             elif (c in (0, 10, 1090, 1160, 1900, 1910, 4000, 6000)) and state[_DWELL] == 0:
                 state[_DWELL] = np.nan
             continue
@@ -198,12 +208,14 @@ def execute(
                         v *= unit
                     target[j] = q[j] + v if state[_REL] else v - offset[j]
                     moved = moved or target[j] != q[j]
-            e = 0.0
+            words = e = 0.0
             if not math.isnan(value[feeder]):
                 v = value[feeder] * unit
-                e = v if state[_EREL] else v - state[_E]
-                state[_E] += e
-                e *= state[_FLOW]
+                words = v if state[_EREL] else v - state[_E]
+                state[_E] += words
+                e = words * state[_FLOW]
+                if state[_VOLUME] > 0 and state[_AREA] > 0:
+                    e /= state[_AREA]
             pieces = 1
             cx = cy = a0 = sweep = 0.0
             if c >= 20:
@@ -222,9 +234,7 @@ def execute(
             elif not moved and e == 0:
                 continue
             if made + pieces > room:
-                # undo the filament, since the command comes again with more room
-                if not math.isnan(value[feeder]):
-                    state[_E] -= e / state[_FLOW]
+                state[_E] -= words  # the command comes again with more room
                 return i, made
             begin = q.copy()
             for p in range(1, pieces + 1):

@@ -1,8 +1,6 @@
 """What the comments of a program say about its motions: role, width, height, wanted speed, layer.
 
-Understood are this project's own keys (`;ROLE:`, `;SPEED:`), those that PrusaSlicer, OrcaSlicer and their viewers share
-(`;TYPE:`, `;WIDTH:`, `;HEIGHT:`, `;LAYER_CHANGE`, `;Z:`), and those of Cura (`;TYPE:WALL-OUTER`, `;LAYER:`) and
-Simplify3D (`; feature`). A comment holds until the next of its kind.
+A comment (see `comments`) holds until the next of its kind.
 """
 
 from collections.abc import Iterable, Iterator
@@ -13,27 +11,12 @@ from numpy.typing import NDArray
 
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.roles import Role
+from trunnion_sim.comments import OTHER, Meaning, meaning
 from trunnion_sim.reader import Block
 
-OTHER = -1
-"""A role that the comments name and this project has not, such as support; or none named at all."""
 LAST_LAYER = 1_000_000_000
 HEADER_KEYS = 2000
 """`; key = value` comments kept at most."""
-
-_ROLES = {
-    Role.OUTER_WALL: "external perimeter|outer wall|wall-outer|overhang perimeter|overhang wall|outer perimeter",
-    Role.INNER_WALL: "perimeter|inner wall|wall-inner|inner perimeter|gap fill|gap infill|thin wall"
-    "|floating vertical shell",
-    Role.INFILL: "internal infill|sparse infill|fill|infill",
-    Role.SOLID_INFILL: "solid infill|internal solid infill|skin|bottom surface|bridge infill|bridge"
-    "|internal bridge infill|internal bridge|solid layer",
-    Role.TOP_SOLID_INFILL: "top solid infill|top surface|ironing",
-    Role.SKIRT: "skirt/brim|skirt|brim",
-}
-ROLE_OF_TEXT = {name: int(role) for role, names in _ROLES.items() for name in names.split("|")} | {
-    role.text: int(role) for role in Role
-}
 
 
 @dataclass
@@ -45,7 +28,7 @@ class Notes:
     _events: dict[str, tuple[list[int], list[float]]] = field(
         default_factory=lambda: {key: ([], []) for key in ("type", "role", "width", "height", "speed", "layer")}
     )
-    _known: dict[bytes, tuple[str, float] | None] = field(default_factory=dict)
+    _known: dict[bytes, Meaning] = field(default_factory=dict)
     _layer: int = -1
 
     def watch(self, blocks: Iterable[Block]) -> Iterator[Block]:
@@ -59,19 +42,17 @@ class Notes:
         if text in self._known:
             found = self._known[text]
         else:
-            found = _meaning(text)
+            found = meaning(text)
             if len(self._known) < 100_000:
                 self._known[text] = found
-        if found is None:
+        if not found:
             self._header(text)
-            return
-        key, value = found
-        if key == "layer":
-            self._layer = self._layer + 1 if np.isnan(value) else int(value)
-            value = float(self._layer)
-        lines, values = self._events[key]
-        lines.append(line)
-        values.append(value)
+        for key, value in found:
+            if key == "layer":
+                self._layer = self._layer + 1 if np.isnan(value) else int(value)
+            lines, values = self._events[key]
+            lines.append(line)
+            values.append(float(self._layer) if key == "layer" else value)
 
     def _header(self, text: bytes) -> None:
         name, equals, value = text.partition(b" = ")
@@ -139,27 +120,3 @@ def row_notes(notes: Notes, lines: IntArray) -> RowNotes:
         notes=notes,
         lines=lines,
     )
-
-
-def _meaning(text: bytes) -> tuple[str, float] | None:
-    """Kind and value of one comment (without its semicolon); None where it says nothing that is understood."""
-    words = text.decode("utf-8", "replace").strip()
-    if words in ("LAYER_CHANGE", "CHANGE_LAYER"):
-        return "layer", np.nan
-    for prefix, kind in (("ROLE:", "role"), ("TYPE:", "type"), ("FEATURE:", "type"), ("feature ", "type")):
-        if words.startswith(prefix):
-            return kind, float(ROLE_OF_TEXT.get(words[len(prefix) :].strip().lower(), OTHER))
-    for prefix, kind in (
-        ("WIDTH:", "width"),
-        ("LINE_WIDTH:", "width"),
-        ("HEIGHT:", "height"),
-        ("SPEED:", "speed"),
-        ("LAYER:", "layer"),
-    ):
-        if words.startswith(prefix):
-            try:
-                value = float(words[len(prefix) :])
-            except ValueError:
-                return None
-            return (kind, value) if np.isfinite(value) else None
-    return None

@@ -31,7 +31,7 @@ def check(context: Context) -> Iterator[Finding]:
     length = np.where(replay.length > 0, replay.length, np.inf)
     changes = (replay.cruise > replay.entry + 1e-9) | (replay.cruise > replay.exit + 1e-9)
     for k, joint in enumerate(profile.joints):
-        hard = np.abs(np.diff(context.motion.path[:, k])) / length * replay.acceleration
+        hard = context.surely_moved(k) / length * replay.acceleration
         over = (hard > joint.acceleration * (1 + SLACK)) & changes & ~context.homing
         yield from context.find(
             "joint-acceleration",

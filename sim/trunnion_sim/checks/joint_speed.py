@@ -36,8 +36,8 @@ def check(context: Context) -> Iterator[Finding]:
     length = np.where(replay.length > 0, replay.length, np.inf)
     still = _linear_way(context) <= context.rules.shortest_linear
     for k, joint in enumerate(context.profile.joints):
-        per_length = np.abs(np.diff(context.motion.path[:, k])) / length
-        asked, driven = per_length * replay.asked, per_length * replay.cruise
+        asked = np.abs(np.diff(context.motion.path[:, k])) / length * replay.asked
+        driven = context.surely_moved(k) / length * replay.cruise
         limit = joint.speed * (1 + SPEED_SLACK)
         over = (asked > limit) & ~context.homing
         if not joint.rotary:
