@@ -62,11 +62,12 @@ def overlapping(
     joined = meets & path.plain & path.plain[following]
     meets &= ~(joined & (cosine < TURNS_BACK))
     joined &= meets
-    corner, calm = _joints_of_plain_moves(path, wanted, following, cosine, joined, plane, tolerance)
+    corner, calm, cut, arc = _joints_of_plain_moves(path, wanted, following, cosine, joined, plane, tolerance)
     push = path.push * np.where(joined, calm, 0.5 * calm)
-    corner = _reachable(path.length, push, wanted, corner, joined)
-    blend = np.where(meets & ~joined, _blend_speeds(path.length, wanted, push, following, cosine, tolerance), 0.0)
-    seconds, entry, leave = _laid_over(path.length, wanted, push, corner, joined, blend, meets, CYCLE)
+    leg = path.length - cut - np.append(0.0, cut[:-1])
+    corner = _reachable(leg, push, wanted, corner, joined)
+    blend = np.where(meets & ~joined, _blend_speeds(leg, wanted, push, following, cosine, tolerance), 0.0)
+    seconds, entry, leave = _laid_over(leg, wanted, push, corner, joined, blend, meets, arc, CYCLE)
     return _trapezoids(path.length, seconds, entry, leave, push)
 
 
@@ -78,19 +79,25 @@ def _joints_of_plain_moves(
     joined: BoolArray,
     plane: FloatArray,
     tolerance: float,
-) -> tuple[FloatArray, FloatArray]:
-    """(m,) speed at the end of moves that are joined, and (m,) share of the acceleration left to each move."""
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Of moves that are joined: speed at the end, share of the acceleration, mm cut off there, s on the arc instead."""
     fastest = np.minimum(wanted, wanted[following])
     jump = np.abs(path.direction[following] - path.direction) / plane
     kink = (fastest / CYCLE + path.push[following]) * jump.max(axis=1)
     half = np.sqrt(0.5 * (1.0 + cosine))
     weaker = np.minimum(path.push, path.push[following])
     with np.errstate(divide="ignore", invalid="ignore"):
-        arc = np.sqrt(ON_ARC * weaker * tolerance * half / (1.0 - half))
-        slow = np.minimum(fastest, np.fmax(arc, fastest * KINK / kink))
-    corner = np.where(joined, np.where(kink < KINK, fastest, slow), 0.0)
+        lean = np.sqrt(1.0 - half**2) / half
+        room = 0.5 * np.minimum(path.length, path.length[following]) / lean
+        radius = np.minimum(tolerance * half / (1.0 - half), room)
+        around = np.minimum(fastest, np.sqrt(ON_ARC * weaker * radius))
+        slowed = fastest * KINK / kink
+        rounded = joined & (kink >= KINK) & (around >= slowed)
+        cut = np.where(rounded, radius * lean, 0.0)
+        arc = np.where(rounded, radius * np.arccos(cosine) / around, 0.0)
+        corner = np.where(joined, np.where(kink < KINK, fastest, np.where(rounded, around, slowed)), 0.0)
     spent = np.where(joined & (kink < KINK), kink, 0.0)
-    return corner, 1.0 - np.maximum(spent, np.append(0.0, spent[:-1]))
+    return corner, 1.0 - np.maximum(spent, np.append(0.0, spent[:-1])), cut, arc
 
 
 def _reachable(
@@ -126,6 +133,7 @@ def _laid_over(
     joined: BoolArray,
     blend: FloatArray,
     meets: BoolArray,
+    arc: FloatArray,
     cycle: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(m,) s between the corners of every move, and the speeds there along it."""
@@ -138,7 +146,7 @@ def _laid_over(
     for i in range(m):
         done, speed, slows, last = _ramp(length[i], first, corner[i], wanted[i], push[i], cycle)
         count = len(done) - 1
-        at = start
+        at = start - (0.5 * arc[i - 1] if i > 0 else 0.0)
         if i > 0:
             if meets[i - 1] and not joined[i - 1]:
                 # In seconds at the speeds that both want.
@@ -153,7 +161,7 @@ def _laid_over(
         gone = max(start + count * cycle, free)
         after = gone
         if joined[i]:
-            after = start + (count - 1) * cycle + last
+            after = start + (count - 1) * cycle + last + arc[i]
         elif blend[i] > 0.0:
             for c in range(1, count + 1):
                 if start + (c - 1) * cycle > free - 0.5 * cycle and slows[c] and speed[c] < blend[i]:

@@ -4,7 +4,7 @@ Every move has a trapezoid of its own from rest to rest. Moves with rotary or UV
 is driven with half its acceleration, and the next one sets off while the one before it slows down, as soon as that is
 below its blend velocity (`tpComputeBlendVelocity`); for some cycles both are under way and their velocities add.
 Moves of X, Y and Z alone are joined by an arc inside G64 P, or by slowing down until the kink is harmless
-(`tpSetupTangent`); here the arc is a speed at the corner.
+(`tpSetupTangent`).
 
     one move after the other        what the tip does
 
@@ -92,6 +92,7 @@ def linuxcnc(
     meets = np.full(n, STOPPED)
     common = np.zeros(n)  # speed at the end of a joined move
     share = np.ones(n)  # of the acceleration that moves along the path
+    cut, arc = np.zeros(n), np.zeros(n)  # mm that arcs take from a move, s on the arc at its end
     pending = True
     p = 0
     for i in range(n):
@@ -100,7 +101,7 @@ def linuxcnc(
             if not pending:
                 b = moving[p - 1]
                 _meet(b, i, delta, direction, leader, linear, length, wanted, top, push, acceleration_limit, tolerance,
-                      cycle, meets, common, share)  # fmt: skip
+                      cycle, meets, common, share, cut, arc)  # fmt: skip
             pending = False
             p += 1
     # A move that is last before a stop is ready to blend like any other (its termination condition), at half.
@@ -112,10 +113,10 @@ def linuxcnc(
     for q in range(m - 2, -1, -1):
         i, after = moving[q], moving[q + 1]
         if meets[i] == JOINED:
-            reach = math.sqrt(common[after] ** 2 + 2.0 * push[after] * length[after])
+            reach = math.sqrt(common[after] ** 2 + 2.0 * push[after] * (length[after] - cut[after]))
             common[i] = min(min(common[i], reach), min(min(wanted[i], top[i]), min(wanted[after], top[after])))
     return _cycles(moving, length, asked, np.minimum(wanted, top), push, meets, common, direction, leader, tolerance,
-                   cycle)  # fmt: skip
+                   cycle, length - cut, arc)  # fmt: skip
 
 
 @njit(cache=True)
@@ -136,6 +137,8 @@ def _meet(
     meets: _I,
     common: _F,
     share: _F,
+    cut: _F,
+    arc: _F,
 ) -> None:
     """How row `b` meets row `i`: parabolic blends where anything but X, Y and Z moves (`tcRotaryMotionCheck`)."""
     meets[b] = BLENDED
@@ -158,8 +161,15 @@ def _meet(
         share[b], share[i] = min(share[b], 1.0 - scale), min(share[i], 1.0 - scale)
         return
     half = math.sqrt(max(0.5 * (1.0 + cosine), 0.0))
-    arc = math.sqrt(ARC_NORMAL * min(push[b], push[i]) * tolerance * half / (1.0 - half)) if half < 1.0 else fastest
-    meets[b], common[b] = JOINED, min(fastest, max(arc, fastest * KINK / scale))
+    lean = math.sqrt(max(1.0 - half * half, 0.0)) / half
+    # No arc takes more than half of a move.
+    radius = min(tolerance * half / max(1.0 - half, 1e-12), 0.5 * min(length[b], length[i]) / max(lean, 1e-12))
+    around = min(fastest, math.sqrt(ARC_NORMAL * min(push[b], push[i]) * radius))
+    meets[b], common[b] = JOINED, max(around, fastest * KINK / scale)
+    if around >= common[b]:
+        cut[b] += radius * lean
+        cut[i] += radius * lean
+        arc[b] = radius * math.acos(cosine) / around
 
 
 @njit(cache=True)
@@ -190,6 +200,8 @@ def _cycles(
     leader: _I,
     tolerance: float,
     cycle: float,
+    leg: _F,
+    arc: _F,
 ) -> Law:
     """Run the servo cycles (`tpRunCycle`) and read off when every row begins and ends, and how fast."""
     n = len(length)
@@ -219,7 +231,7 @@ def _cycles(
             cosine = min(1.0, max(-1.0, cosine))
             if meets[i] == BLENDED:
                 blend = _blend_speed(
-                    length[i], length[after], wanted[i], wanted[after], push[i], push[after], cosine, tolerance
+                    leg[i], leg[after], wanted[i], wanted[after], push[i], push[after], cosine, tolerance
                 )
         blending = False
         handed = -1.0  # when the row ended
@@ -230,20 +242,21 @@ def _cycles(
             was, was_after = speed[i], speed[after] if after >= 0 else 0.0
             if not ended:
                 span[i] = cycle
-                slowing = _update(i, length, done, speed, arrives, span, finished, wanted, push, final, cycle)
+                slowing = _update(i, leg, done, speed, arrives, span, finished, wanted, push, final, cycle)
                 blending = blending or (slowing and speed[i] < blend)
             elif meets[i] == JOINED:
-                handed = clock + span[i]
+                handed = clock + span[i] + 0.5 * arc[i]
+                clock += arc[i]
                 leave[i] = entry[after] = speed[after] = was_after = arrives[i]
                 span[after] = cycle - span[i]
             elif meets[i] == STOPPED:
                 handed = clock
             if after >= 0 and (blending or ended):
                 ahead = common[after] if ended and meets[after] == JOINED else 0.0
-                _update(after, length, done, speed, arrives, span, finished, wanted, push, ahead, cycle)
+                _update(after, leg, done, speed, arrives, span, finished, wanted, push, ahead, cycle)
             if meets[i] == BLENDED and (blending or ended) and handed < 0.0:
                 # What is owed of this move and had of the next, in seconds at the speeds that they want.
-                gap = (0.0 if ended else (length[i] - done[i]) / wanted[i]) - done[after] / wanted[after]
+                gap = (0.0 if ended else (leg[i] - done[i]) / wanted[i]) - done[after] / wanted[after]
                 if gap <= 0.0:
                     part = gap_was / (gap_was - gap)
                     handed = clock + part * cycle
@@ -252,7 +265,7 @@ def _cycles(
                     pace = min(1.0, mine / wanted[i] + other / wanted[after])
                     leave[i], entry[after] = pace * wanted[i], pace * wanted[after]
             if meets[i] == BLENDED and not ended:
-                gap_was = (length[i] - done[i]) / wanted[i] - done[after] / wanted[after]
+                gap_was = (leg[i] - done[i]) / wanted[i] - done[after] / wanted[after]
             clock += cycle
             if ended:
                 break
