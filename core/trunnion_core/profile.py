@@ -13,6 +13,8 @@ from pydantic import ValidationError
 from trunnion_core.arrays import FloatArray
 from trunnion_core.errors import ProfileError
 from trunnion_core.profile_file import (
+    STEPS_PER_DEG,
+    STEPS_PER_MM,
     BedTable,
     ExtruderTable,
     GcodeTable,
@@ -47,7 +49,7 @@ class Joint:
     corner_speed: float
     home: float
     steps_per_unit: float
-    """Per mm or rad; inf where the profile gives none."""
+    """Per mm or rad."""
 
     @property
     def unit(self) -> str:
@@ -260,7 +262,7 @@ def _joint(table: JointTable) -> Joint:
         jerk=math.inf if table.jerk is None else table.jerk * to_internal,
         corner_speed=table.corner_speed * to_internal,
         home=home,
-        steps_per_unit=math.inf if table.steps_per_unit is None else table.steps_per_unit / to_internal,
+        steps_per_unit=(table.steps_per_unit or (STEPS_PER_DEG if rotary else STEPS_PER_MM)) / to_internal,
     )
 
 

@@ -17,6 +17,8 @@ RESERVED_LETTERS = set("EFGMNST")
 """Letters that G-code uses for something else than an axis."""
 BED = "bed"
 """What findings, and `touches`, call the plate that the part stands on."""
+STEPS_PER_MM, STEPS_PER_DEG = 80.0, 44.4444
+"""Steps of joints whose profile gives none: a belt over 20 teeth, and the same motor geared down by five."""
 
 
 class JointTable(Table):
@@ -46,7 +48,11 @@ class JointTable(Table):
         0.0, ge=0, description="What may jump at a corner, mm/s or degrees/s (the firmware's classic jerk)."
     )
     home: float | None = Field(None, description="Value after homing, mm or degrees; by default 0, or the nearest end.")
-    steps_per_unit: float | None = Field(None, gt=0, description="Motor steps per mm or degree.")
+    steps_per_unit: float | None = Field(
+        None,
+        gt=0,
+        description=f"Motor steps per mm or degree; by default {STEPS_PER_MM:g} per mm, {STEPS_PER_DEG:g} per degree.",
+    )
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -2,6 +2,8 @@
 
 import math
 import re
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,8 @@ from numpy.testing import assert_allclose
 
 from trunnion_core.errors import ProfileError
 from trunnion_core.profile import load_profile, shipped_profiles
+
+PROFILES = Path(__file__).parents[2] / "machine_profiles"
 
 GOOD = """
 [machine]
@@ -99,6 +103,12 @@ def test_a_shipped_machine_loads_and_makes_sense(name):
         assert not key.startswith("joint.") or key.rpartition(".")[0] in letters
 
 
+@pytest.mark.parametrize("name", shipped_profiles())
+def test_a_shipped_machine_says_its_own_steps(name):
+    table = tomllib.loads((PROFILES / f"{name}.toml").read_text(encoding="utf-8"))
+    assert all("steps_per_unit" in joint for joint in table["joint"])
+
+
 def test_the_five_of_the_design_are_shipped():
     assert list(shipped_profiles()) == [
         "generic_3axis",
@@ -115,6 +125,7 @@ def test_degrees_become_radians_and_directions_unit(tmp_path):
     assert_allclose(x.axis, [1, 0, 0])
     assert (b.max, b.speed, b.steps_per_unit) == pytest.approx((math.pi / 2, math.pi, 20 * 180 / math.pi))
     assert (c.min, c.max) == (-math.inf, math.inf)
+    assert (x.steps_per_unit, c.shown(1 / c.steps_per_unit)) == pytest.approx((80, 1 / 44.4444))
     assert (y.home, z.home) == (0.0, 5.0)
     assert profile.rotary == (3, 4)
     assert b.shown(b.max) == pytest.approx(90)

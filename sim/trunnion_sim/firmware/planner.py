@@ -18,8 +18,6 @@ FEW_MOVES = 3
 """With this many moves planned nothing is waited for."""
 MIN_SEGMENT_TIME = 0.02
 """s: DEFAULT_MINSEGMENTTIME, below which a draining queue is slowed down."""
-DEFAULT_STEPS = {False: 80.0, True: 44.4444}
-"""Steps per mm and per degree where the profile gives none."""
 UNLIMITED_ACCELERATION = 1e6
 """mm/s² along the path where the profile leaves the limit to the joints."""
 
@@ -33,8 +31,7 @@ class Planner:
         self.n = n
         self.limits: FloatArray = np.zeros((5, n))
         for i, joint in enumerate(joints):
-            steps = joint.steps_per_unit / joint.shown(1.0)
-            self.limits[kernel.STEPS_PER_UNIT, i] = steps if np.isfinite(steps) else DEFAULT_STEPS[joint.rotary]
+            self.limits[kernel.STEPS_PER_UNIT, i] = joint.steps_per_unit / joint.shown(1.0)
             self.limits[kernel.MAX_SPEED, i] = joint.shown(joint.speed)
             self.limits[kernel.MAX_ACCELERATION, i] = joint.shown(joint.acceleration)
             self.limits[kernel.JERK, i] = joint.shown(joint.corner_speed)
