@@ -88,8 +88,9 @@ def auto_position(machine: "SoftwareMachine", command: Command) -> None:
 
 
 def settings(machine: "SoftwareMachine", command: Command) -> None:
-    """M503."""
-    machine.say(replies.settings(machine.motion, machine.planner))
+    """M503; S0 leaves the headings out."""
+    bare = "S" in command.words and command.value("S") == 0
+    machine.say(replies.settings(machine.motion, machine.planner, bare=bare))
 
 
 def kill(machine: "SoftwareMachine", command: Command) -> None:

@@ -237,7 +237,7 @@ class SoftwareMachine:
 
     def position_report(self) -> str:
         """Logical end of the queue, and where the motors are now."""
-        return replies.position(self.motion.letters, self.motion.logical(), self.planner.steps_now(self.now))
+        return replies.position(self.motion, self.motion.logical(), self.planner.steps_now(self.now))
 
     def temperature_report(self) -> str:
         """Every heater's reading, target and duty."""

@@ -28,6 +28,9 @@ class Motion:
         joints = profile.joints
         self.letters = profile.letters
         k = len(joints)
+        first = [letter for letter in "XYZ" if letter in profile.letters]
+        self.order = [*first, *(letter for letter in profile.letters if letter not in first)]
+        """Letters as the firmware counts its axes: X, Y, Z, then the others; reports follow it."""
         self.columns = {letter: i for i, letter in enumerate((*profile.letters, "E"))}
         self.linear = [not joint.rotary for joint in joints] + [True]
         self.low = [joint.shown(joint.min) for joint in joints] + [-math.inf]
@@ -42,6 +45,7 @@ class Motion:
         self.unit = 1.0
         self.feed = STARTING_FEED
         self.feed_factor = 1.0
+        self.kept_feed_factor = 1.0
         self.flow_factor = 1.0
         self.soft_limits = True
         self.tip = tip_control_of(profile)

@@ -4,12 +4,17 @@ from typing import TYPE_CHECKING
 
 from trunnion_sim import homing
 from trunnion_sim.firmware import planner_kernel as kernel
+from trunnion_sim.firmware import replies
 from trunnion_sim.firmware.parser import Command
 from trunnion_sim.firmware.planner import FIRST_MOVE_DELAY
 from trunnion_sim.firmware.waits import Steps, Wait
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from trunnion_sim.firmware.machine import SoftwareMachine
+    from trunnion_sim.firmware.motion import Motion
+    from trunnion_sim.firmware.planner import Planner
 
 LONGEST_DWELL = 4294967.295
 """s: what 32 bits of milliseconds hold."""
@@ -125,17 +130,24 @@ def stop(machine: "SoftwareMachine", command: Command) -> None:
 
 
 def feed_factor(machine: "SoftwareMachine", command: Command) -> None:
-    """M220: percentage on every F."""
-    if "S" in command.words:
-        machine.motion.feed_factor = min(max(command.value("S"), 1.0), 999.0) / 100.0
-    else:
-        machine.say(f"FR:{round(machine.motion.feed_factor * 100)}%\n")
+    """M220: whole percentage on every F; B keeps the present one, R brings back what was kept (`M220.cpp`)."""
+    motion = machine.motion
+    if not command.words:
+        machine.say(f"FR:{round(motion.feed_factor * 100)}%\n")
+        return
+    now = motion.feed_factor
+    if "R" in command.words:
+        motion.feed_factor = motion.kept_feed_factor
+    if "B" in command.words:
+        motion.kept_feed_factor = now
+    if command.number("S") is not None:
+        motion.feed_factor = max(int(command.value("S")), 1) / 100.0
 
 
 def flow_factor(machine: "SoftwareMachine", command: Command) -> None:
-    """M221: percentage on filament."""
-    if "S" in command.words:
-        machine.motion.flow_factor = min(max(command.value("S"), 10.0), 999.0) / 100.0
+    """M221: whole percentage on filament."""
+    if command.number("S") is not None:
+        machine.motion.flow_factor = max(int(command.value("S")), 0) / 100.0
     else:
         machine.say(f"echo:E0 Flow: {round(machine.motion.flow_factor * 100)}%\n")
 
@@ -146,26 +158,22 @@ def soft_limits(machine: "SoftwareMachine", command: Command) -> None:
     if "S" in command.words:
         motion.soft_limits = command.value("S") != 0
         return
-    low = " ".join(f"{x}{v:.2f}" for x, v in zip(motion.letters, motion.low, strict=False))
-    high = " ".join(f"{x}{v:.2f}" for x, v in zip(motion.letters, motion.high, strict=False))
-    state = "ON" if motion.soft_limits else "OFF"
-    machine.say(f"echo:; Soft endstops:\necho:  M211 S{int(motion.soft_limits)} ; {state}\n")
-    machine.say(f"echo:  Min:  {low}   Max:  {high}\n")
+    machine.say(f"{replies.soft_limits(motion)}\n")
 
 
 def steps_per_unit(machine: "SoftwareMachine", command: Command) -> None:
     """M92."""
-    _set_limits(machine, command, kernel.STEPS_PER_UNIT, "M92")
+    _set_limits(machine, command, kernel.STEPS_PER_UNIT, replies.steps)
 
 
 def max_acceleration(machine: "SoftwareMachine", command: Command) -> None:
     """M201."""
-    _set_limits(machine, command, kernel.MAX_ACCELERATION, "M201")
+    _set_limits(machine, command, kernel.MAX_ACCELERATION, replies.accelerations)
 
 
 def max_speed(machine: "SoftwareMachine", command: Command) -> None:
     """M203."""
-    _set_limits(machine, command, kernel.MAX_SPEED, "M203")
+    _set_limits(machine, command, kernel.MAX_SPEED, replies.speeds)
 
 
 def path_acceleration(machine: "SoftwareMachine", command: Command) -> None:
@@ -173,23 +181,20 @@ def path_acceleration(machine: "SoftwareMachine", command: Command) -> None:
     state = machine.planner.state
     places = {"S": (kernel.PRINT_ACCELERATION, kernel.TRAVEL_ACCELERATION), "P": (kernel.PRINT_ACCELERATION,)}
     places |= {"R": (kernel.RETRACT_ACCELERATION,), "T": (kernel.TRAVEL_ACCELERATION,)}
-    given = False
     for letter, where in places.items():
         if command.value(letter) > 0:
-            given = True
             for place in where:
                 state[place] = command.value(letter)
-    if not given and not command.words:
-        machine.say(
-            f"echo:  M204 P{state[kernel.PRINT_ACCELERATION]:.2f} R{state[kernel.RETRACT_ACCELERATION]:.2f} "
-            f"T{state[kernel.TRAVEL_ACCELERATION]:.2f}\n"
-        )
+    if not command.words:
+        machine.say(f"{replies.path_accelerations(machine.planner)}\n")
 
 
 def corners(machine: "SoftwareMachine", command: Command) -> None:
     """M205: what may jump per axis, J junction deviation, B shortest segment in microseconds."""
     state, limits, motion = machine.planner.state, machine.planner.limits, machine.motion
     uses_deviation = state[kernel.JUNCTION_DEVIATION] > 0
+    if not command.words:
+        machine.say(f"{replies.corners(motion, machine.planner)}\n")
     for letter, number in command.words.items():
         if number is None or number < 0:
             continue
@@ -220,7 +225,10 @@ def nothing(machine: "SoftwareMachine", command: Command) -> None:
     """Accepted without a visible effect."""
 
 
-def _set_limits(machine: "SoftwareMachine", command: Command, row: int, code: str) -> None:
+def _set_limits(
+    machine: "SoftwareMachine", command: Command, row: int, report: "Callable[[Motion, Planner], str]"
+) -> None:
+    """Set what letters name; without words, say what holds, with no echo before it (`M92_report` with forReplay)."""
     limits, motion = machine.planner.limits, machine.motion
     given = False
     for letter, number in command.words.items():
@@ -230,8 +238,7 @@ def _set_limits(machine: "SoftwareMachine", command: Command, row: int, code: st
     if row == kernel.STEPS_PER_UNIT and given:
         machine.planner.refresh(motion.joints)
     if not command.words:
-        words = "".join(f" {x}{v:.2f}" for x, v in zip((*motion.letters, "E"), limits[row], strict=True))
-        machine.say(f"echo:  {code}{words}\n")
+        machine.say(f"{report(motion, machine.planner)}\n")
 
 
 CODES = {

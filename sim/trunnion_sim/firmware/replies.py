@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from trunnion_core.arrays import FloatArray
 from trunnion_sim.firmware import planner_kernel as kernel
 from trunnion_sim.firmware.heat import Heater, HeatError
 
@@ -87,10 +88,10 @@ def temperatures(heaters: Iterable[Heater]) -> str:
     return text
 
 
-def position(letters: Sequence[str], values: Sequence[float], counts: Iterable[float]) -> str:
-    """M114: logical positions with the filament last, then motor steps."""
-    where = " ".join(f"{letter}:{value:.2f}" for letter, value in zip((*letters, "E"), values, strict=True))
-    count = " ".join(f"{letter}:{int(value)}" for letter, value in zip(letters, counts, strict=False))
+def position(motion: "Motion", values: Sequence[float], counts: FloatArray) -> str:
+    """M114: logical positions with the filament last, then motor steps (`motion.cpp`, `report_current_position`)."""
+    where = " ".join(f"{letter}:{values[motion.columns[letter]]:.2f}" for letter in (*motion.order, "E"))
+    count = " ".join(f"{letter}:{int(counts[motion.columns[letter]])}" for letter in motion.order)
     return f"{where} Count {count}\n"
 
 
@@ -106,38 +107,63 @@ def prompt(text: str, button: str) -> str:
     return f"//action:prompt_end\n//action:prompt_begin {text}\n//action:prompt_button {button}\n//action:prompt_show\n"
 
 
-def settings(motion: "Motion", planner: "Planner") -> str:
-    """M503."""
-    limits = planner.limits
-    state = planner.state
-    junction = state[kernel.JUNCTION_DEVIATION]
-    lines = [
-        "; Linear Units:",
-        "  G21 ; (mm)",
-        "; Temperature Units:",
-        "  M149 C ; Units in Celsius",
-        "; Steps per unit:",
-        "  M92" + _words(motion.letters, limits[kernel.STEPS_PER_UNIT]),
-        "; Max feedrates (units/s):",
-        "  M203" + _words(motion.letters, limits[kernel.MAX_SPEED]),
-        "; Max Acceleration (units/s2):",
-        "  M201" + _words(motion.letters, limits[kernel.MAX_ACCELERATION]),
-        "; Acceleration (units/s2) (P<print-accel> R<retract-accel> T<travel-accel>):",
-        f"  M204 P{state[kernel.PRINT_ACCELERATION]:.2f} R{state[kernel.RETRACT_ACCELERATION]:.2f} "
-        f"T{state[kernel.TRAVEL_ACCELERATION]:.2f}",
-    ]
-    corner = f"J{junction:.2f}" if junction > 0 else _words(motion.letters, limits[kernel.JERK]).lstrip()
-    names = "J<junc_dev>" if junction > 0 else " ".join(f"{x}<max_jerk>" for x in (*motion.letters, "E"))
+def settings(motion: "Motion", planner: "Planner", *, bare: bool = False) -> str:
+    """M503; `bare`, with S0, without headings and echoes (`settings.cpp`, `gcode.cpp` `report_heading`)."""
+    lines = ["; Linear Units:", "  G21 ; (mm)", "; Temperature Units:", "  M149 C ; Units in Celsius"]
+    lines += ["; Steps per unit:", steps(motion, planner), "; Max feedrates (units/s):", speeds(motion, planner)]
+    lines += ["; Max Acceleration (units/s2):", accelerations(motion, planner)]
     lines += [
-        f"; Advanced (B<min_segment_time_us> S<min_feedrate> T<min_travel_feedrate> {names}):",
-        f"  M205 B{state[kernel.MIN_SEGMENT_TIME] * 1e6:.2f} S0.00 T0.00 {corner}",
-        "; Home offset:",
-        "  M206" + "".join(f" {letter}0.00" for letter in motion.letters),
+        "; Acceleration (units/s2) (P<print-accel> R<retract-accel> T<travel-accel>):",
+        path_accelerations(planner),
     ]
+    if planner.state[kernel.JUNCTION_DEVIATION] > 0:
+        names = "J<junc_dev>"
+    else:
+        names = " ".join(f"{letter}<max_jerk>" for letter in (*motion.order, "E"))
+    lines += [f"; Advanced (B<min_segment_time_us> S<min_feedrate> T<min_travel_feedrate> {names}):"]
+    lines += [corners(motion, planner), "; Home offset:", "  M206" + "".join(f" {x}0.00" for x in motion.order)]
     if motion.tip is not None:
         lines += ["; Penta axis:", motion.tip.report()]
+    if bare:
+        return "".join(f"{line}\n" for line in lines if not line.startswith(";"))
     return "".join(f"echo:{line}\n" for line in lines)
 
 
-def _words(letters: Sequence[str], values: Sequence[float]) -> str:
-    return "".join(f" {letter}{value:.2f}" for letter, value in zip((*letters, "E"), values, strict=True))
+def steps(motion: "Motion", planner: "Planner") -> str:
+    """M92."""
+    return "  M92" + _words(motion, planner.limits[kernel.STEPS_PER_UNIT])
+
+
+def speeds(motion: "Motion", planner: "Planner") -> str:
+    """M203."""
+    return "  M203" + _words(motion, planner.limits[kernel.MAX_SPEED])
+
+
+def accelerations(motion: "Motion", planner: "Planner") -> str:
+    """M201."""
+    return "  M201" + _words(motion, planner.limits[kernel.MAX_ACCELERATION])
+
+
+def path_accelerations(planner: "Planner") -> str:
+    """M204."""
+    places = {"P": kernel.PRINT_ACCELERATION, "R": kernel.RETRACT_ACCELERATION, "T": kernel.TRAVEL_ACCELERATION}
+    return "  M204" + "".join(f" {letter}{planner.state[place]:.2f}" for letter, place in places.items())
+
+
+def corners(motion: "Motion", planner: "Planner") -> str:
+    """M205."""
+    deviation = planner.state[kernel.JUNCTION_DEVIATION]
+    rule = f" J{deviation:.2f}" if deviation > 0 else _words(motion, planner.limits[kernel.JERK])
+    return f"  M205 B{planner.state[kernel.MIN_SEGMENT_TIME] * 1e6:.2f} S0.00 T0.00{rule}"
+
+
+def soft_limits(motion: "Motion") -> str:
+    """M211, two lines."""
+    low = "".join(f" {letter}{motion.low[motion.columns[letter]]:.2f}" for letter in motion.order)
+    high = "".join(f" {letter}{motion.high[motion.columns[letter]]:.2f}" for letter in motion.order)
+    on = motion.soft_limits
+    return f"  M211 S{int(on)} ; {'ON' if on else 'OFF'}\n  Min: {low}   Max: {high}"
+
+
+def _words(motion: "Motion", values: FloatArray) -> str:
+    return "".join(f" {letter}{values[motion.columns[letter]]:.2f}" for letter in (*motion.order, "E"))
