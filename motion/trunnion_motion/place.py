@@ -43,7 +43,8 @@ def place(poses: Poses, profile: MachineProfile) -> Placement:
     """The least turn, and for it the least shift, on the grid at which `fits` holds.
 
     The grid: shifts in SHIFT_STEP along x and y from where the part stands, turns in TURN_STEP_DEG. Raises
-    PlacementError where no place holds, saying which joint gives up where as the part stands. No poses fit as they are.
+    PlacementError where no place holds, saying which joint gives up where: as the part stands, or in the middle of the
+    bed if it stands beside it. No poses fit as they are.
     """
     if not len(poses.points):
         return Placement(0.0, (0.0, 0.0), (0.0, 0.0))
@@ -66,10 +67,13 @@ def place(poses: Poses, profile: MachineProfile) -> Placement:
                 x, y = (float(value) for value in left[0])
                 return Placement(float(turn), (x, y), (float(center[0]), float(center[1])))
             few = np.union1d(few, failing)
-    reasons = "; ".join(finding.message for finding in fits(poses, profile).findings)
+    where, stands = "as it stands", poses
+    if not over_bed(poses.points, profile).all():
+        where, stands = "in the middle of the bed", _placed(poses, center, 0.0, -center)
+    reasons = "; ".join(finding.message for finding in fits(stands, profile).findings)
     raise PlacementError(
         f"the part does not fit {profile.name} at any shift (every {SHIFT_STEP:g} mm) and turn (every {TURN_STEP_DEG} "
-        f"degrees); as it stands: {reasons}"
+        f"degrees); {where}: {reasons}"
     )
 
 

@@ -1,5 +1,6 @@
 """Fit and placement: against trying every place, and with names for what gives up."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -30,22 +31,40 @@ def moved(poses, x, y):
 def any_grid_place_holds(poses, profile):
     """The slow road: every turn, every shift, every pose, each with its own inverse solution."""
     chain = JointChain.from_profile(profile)
+    bed = profile.bed
     middle = (poses.points[:, :2].min(axis=0) + poses.points[:, :2].max(axis=0)) / 2
-    side = np.arange(-26, 27) * SHIFT_STEP
+    half = bed.diameter / 2 if bed.diameter else max(np.abs([*bed.min, *bed.max]))
+    most = int(np.ceil((half + np.abs(middle).max()) / SHIFT_STEP))
+    side = np.arange(-most, most + 1) * SHIFT_STEP
     shifts = np.stack(np.meshgrid(side, side, [0.0], indexing="ij"), axis=-1).reshape(-1, 1, 3)
     low, high = profile.array("min"), profile.array("max")
     for turn in range(0, 360, TURN_STEP_DEG):
         turned = Placement(turn, (0.0, 0.0), (middle[0], middle[1])).of(poses)
         points = shifts + turned.points
+        if bed.diameter:
+            over = np.hypot(points[..., 0], points[..., 1]) <= bed.diameter / 2
+        else:
+            over = ((points[..., :2] >= bed.min) & (points[..., :2] <= bed.max)).all(axis=2)
+        points = points[(over & (points[..., 2] <= bed.height)).all(axis=1)]
         axes = np.broadcast_to(turned.tool_axes, points.shape)
         states = chain.inverse(points.reshape(-1, 3), axes.reshape(-1, 3))
         reached = ((states >= low) & (states <= high)).all(axis=2).any(axis=0).reshape(points.shape[:2])
-        over = (np.hypot(points[..., 0], points[..., 1]) <= profile.bed.diameter / 2) & (
-            points[..., 2] <= profile.bed.height
-        )
-        if (reached & over).all(axis=1).any():
+        if reached.all(axis=1).any():
             return True
     return False
+
+
+def random_part(rng, profile):
+    """Eight leaning poses, as large as the machine takes or a little larger, somewhere near its bed."""
+    bed = profile.bed
+    half = bed.diameter / 2 if bed.diameter else max(bed.max)
+    size = np.array([half, half, 0.5 * bed.height]) * rng.uniform([0.2, 0.1, 0.1], [1.0, 0.7, 2.0])
+    points = rng.uniform([-1, -1, 0], [1, 1, 2], (8, 3)) * size
+    points += np.append(rng.uniform(-half, half, 2), 0.0)
+    lean, bearing = np.radians(rng.uniform(2, rng.choice([25, 50, 75]), 8)), rng.uniform(-np.pi, np.pi, 8)
+    return Poses(
+        points, np.stack([np.sin(lean) * np.cos(bearing), np.sin(lean) * np.sin(bearing), np.cos(lean)], axis=1)
+    )
 
 
 def test_what_fits_stays_where_it_is():
@@ -100,6 +119,32 @@ def test_a_place_is_found_exactly_when_trying_every_place_finds_one(machines, ki
         assert not any_grid_place_holds(poses, tight)
     else:
         assert fits(found.of(poses), tight).ok
+
+
+@pytest.mark.parametrize("name", ["generic_ab_cradle", "open5x_prusa_i3", "open5x_voron0", "rep5x_ender3"])
+def test_on_every_machine_random_parts_find_a_place_whenever_trying_every_place_does(name):
+    profile = load_profile(name)
+    found = []
+    for seed in range(14):
+        poses = random_part(np.random.default_rng([seed, 3]), profile)
+        holds = any_grid_place_holds(poses, profile)
+        try:
+            there = place(poses, profile)
+        except PlacementError as error:
+            refused = str(error)
+        else:
+            assert fits(there.of(poses), profile).ok
+            found.append(seed)
+            continue
+        assert not holds
+        assert re.search(r"point \(.*\) mm with tool axis \(.*\).*: joint [A-Z] |lie beside or above", refused)
+    assert 4 <= len(found) <= 10  # neither road is asked for the obvious only
+
+
+def test_of_a_part_beside_the_bed_the_joint_is_named_that_gives_up_on_it():
+    beside = moved(slab(20, 20, 10, np.radians(75)), 300, 0)
+    with pytest.raises(PlacementError, match=r"in the middle of the bed: point .* joint B would need"):
+        place(beside, load_profile("generic_ab_cradle"))
 
 
 def test_what_cannot_fit_names_joint_and_place():
