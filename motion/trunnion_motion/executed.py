@@ -40,12 +40,15 @@ class Execution:
     """(n,) s that the row would take at the speed that its F asks for."""
 
 
-def executed(program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, dialect: Dialect) -> Execution:
+def executed(
+    program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, dialect: Dialect, *, bends: int = BENDS
+) -> Execution:
     """The law of the same rows under the firmware's rules.
 
     `program.cruise` (n,) s is what each row takes at the speed that is wanted and that its joints can go. F asks for
     that, or for less where a row of small corners would bend a joint too fast. Rows that are written as one move
-    share its ramps; rows that are not written at all, since no word changes, take no time.
+    share its ramps; rows that are not written at all, since no word changes, take no time. With no `bends` the
+    corners of curves count for nothing: where rows were cut on the way, what they ask for was settled before.
     """
     moves = make_moves(program, profile, dialect)
     if not len(moves.row):
@@ -54,7 +57,7 @@ def executed(program: MachineProgram, ideal: TimeLaw, profile: MachineProfile, d
     nominal = drive.nominal
     if dialect.planner.corners == "blend":
         return _blended(program, ideal, moves, drive)
-    for _ in range(BENDS):
+    for _ in range(bends):
         corner, _rest = drive.corners(nominal)
         nominal = kernel.bent(drive.share, nominal, moves.metric, corner, drive.acceleration)
     asked = moves.metric / nominal
@@ -132,7 +135,8 @@ class _Drive:
     seen: FloatArray
     """(m, k + 1) the same, as the corners see it: in whole motor steps, where the firmware counts so."""
     kind: IntArray
-    """(m,) 1 where joints move, 2 where linear ones do, 4 where filament moves, added up."""
+    """(m,) 1 where joints move, 2 where linear ones do, 4 where filament moves, added up; or what the firmware tells
+    apart."""
     nominal: FloatArray
     """(m,) units/s wanted."""
     reach: FloatArray
@@ -192,6 +196,9 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
     travelling = printing if planner.travel_acceleration is None else planner.travel_acceleration
     kind = _kinds(moves, profile)
     along = np.where(kind & 1, np.where(moves.filament != 0, printing, travelling), UNLIMITED)
+    if dialect.planner.corners == "reprapfirmware":
+        kind = _melded_kinds(moves, profile)
+        along = np.where(kind & 1, np.where(kind & 2, printing, travelling), UNLIMITED)
     if dialect.planner.corners in ("grbl", "blend"):
         along = np.full(len(along), UNLIMITED)
     linear = np.array([not joint.rotary for joint in profile.joints] + [False])
@@ -200,7 +207,9 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
         straight = (kind & 2) > 0
         along = np.where(straight, config.acceleration, KLIPPER_UNLIMITED)
         plane = linear & (np.array([*profile.letters, "E"]) != "Z")
-        own = np.where(straight[:, None], plane | (np.arange(len(plane)) == len(plane) - 1), False)
+        own = straight[:, None] & plane
+        # The extruder's limits hold where X and Y stand, and where it draws back.
+        own[:, -1] = (steps[:, plane] != 0).any(axis=1) & (moves.filament >= 0)
         with np.errstate(divide="ignore"):
             reach = np.where(own, np.inf, speed / np.abs(share)).min(axis=1)
             push = np.where(own, np.inf, acceleration / np.abs(share)).min(axis=1)
@@ -245,6 +254,13 @@ def _kinds(moves: Moves, profile: MachineProfile) -> IntArray:
     joints = (moves.step != 0).any(axis=1)
     straight = (moves.step[:, linear] != 0).any(axis=1)
     return np.asarray(joints + 2 * straight + 4 * (moves.filament != 0))
+
+
+def _melded_kinds(moves: Moves, profile: MachineProfile) -> IntArray:
+    """(m,) RepRapFirmware stops between kinds: 1 where X or Y moves, 2 if it prints there, 4 if filament moves else."""
+    level = (moves.step[:, [letter in "XY" for letter in profile.letters]] != 0).any(axis=1)
+    prints = level & (moves.filament > 0)
+    return np.asarray(level + 2 * prints + 4 * ((moves.filament != 0) & ~prints))
 
 
 def _stops(moves: Moves, program: MachineProgram) -> BoolArray:

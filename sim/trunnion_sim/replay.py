@@ -10,7 +10,7 @@ import numpy as np
 
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
-from trunnion_sim import blends, motion_kernel, replay_kernel, toolhead_kernel
+from trunnion_sim import blends, duet_kernel, motion_kernel, replay_kernel, toolhead_kernel
 from trunnion_sim.homing import homing_times
 from trunnion_sim.limits import Limits
 from trunnion_sim.merging import blocks_of, laws_of_rows
@@ -165,8 +165,24 @@ def _law(
         law = toolhead_kernel.grbl(delta, feed, motion.inverse, stops, *first, across, blocks)
     elif rules.corners == "linuxcnc":
         law = blends.blended(motion, profile, delta, feed, stops, *first)
+    elif rules.corners == "per_axis":
+        law = duet_kernel.duet(
+            delta,
+            np.append(linear, False),
+            np.array([letter in "XY" for letter in (*profile.letters, "E")]),
+            feed,
+            motion.inverse,
+            stops,
+            limits.which,
+            limits.speed,
+            limits.acceleration,
+            limits.corner,
+            limits.path,
+            limits.slowest,
+            max(rules.least_blocks, profile.planner.blocks),
+        )
     else:
-        return _marlin_or_duet(motion, profile, rules, limits, delta, homing, stops)
+        return _marlin(motion, profile, rules, limits, delta, homing, stops)
     return _homed(law, delta, homing, limits.speed[0])
 
 
@@ -193,7 +209,7 @@ def _homed(law: toolhead_kernel.Law, delta: FloatArray, homing: BoolArray, speed
     return length, asked, entry, cruise, leave, acceleration, duration
 
 
-def _marlin_or_duet(
+def _marlin(
     motion: Motion,
     profile: MachineProfile,
     rules: Rules,
@@ -234,7 +250,6 @@ def _marlin_or_duet(
         limits.acceleration,
         limits.corner,
         limits.path,
-        rules.corners == "per_axis",
         0.0 if deviation is None else deviation,
         max(rules.least_blocks, profile.planner.blocks - rules.unseen_blocks),
         rules.slowest,

@@ -1,4 +1,4 @@
-r"""The planner of printer firmware as compiled loops: nominal speeds, corner speeds, look-ahead, trapezoids.
+r"""The planner of Marlin as compiled loops: nominal speeds, corner speeds, look-ahead, trapezoids.
 
         cruise  ______________
                /              \          acceleration and deceleration are equal,
@@ -7,8 +7,7 @@ r"""The planner of printer firmware as compiled loops: nominal speeds, corner sp
 
 Marlin: `module/planner.cpp` (2.1.2.5), `_populate_block`: the joints' speeds and accelerations scale the whole block; a
 corner is limited by classic jerk, or by junction deviation over all axes in mixed units, in kinematic builds by both. A
-move from a standstill begins from zero, since no pass looks at the first entry (`reverse_pass`). RepRapFirmware:
-`Movement/DDA.cpp`, `MatchSpeeds`: at a common speed no axis may jump by more than its instant speed change.
+move from a standstill begins from zero, since no pass looks at the first entry (`reverse_pass`).
 """
 
 import math
@@ -38,7 +37,6 @@ def plan(
     acceleration_limit: _F,
     corner_limit: _F,
     path_limit: _F,
-    per_axis: bool,
     deviation: float,
     blocks: int,
     slowest: float,
@@ -87,7 +85,7 @@ def plan(
         nominal[i] = v
         acceleration[i] = a
     corner, start = _corners(
-        length, nominal, acceleration, ratio, way, kind, stops, which, corner_limit, acceleration_limit, per_axis,
+        length, nominal, acceleration, ratio, way, kind, stops, which, corner_limit, acceleration_limit,
         deviation, slowest, both_rules,
     )  # fmt: skip
     entry, cruise, leave, duration = _trapezoids(length, nominal, acceleration, corner, start, stops, blocks)
@@ -114,7 +112,6 @@ def _corners(
     which: NDArray[np.int64],
     corner_limit: _F,
     acceleration_limit: _F,
-    per_axis: bool,
     deviation: float,
     slowest: float,
     both_rules: bool,
@@ -134,26 +131,18 @@ def _corners(
             r = abs(ratio[i, j])
             if r * safe > limit[j]:
                 safe = limit[j] / r
-        start[i] = 0.0 if per_axis else min(nominal[i], slowest)
+        start[i] = min(nominal[i], slowest)
         if last >= 0 and not stops[i]:
             v = min(nominal[i], nominal[last])
-            if per_axis:
-                if kind[i] != kind[last]:
-                    v = 0.0
-                for j in range(columns):
-                    jump = abs(ratio[i, j] - ratio[last, j])
-                    if jump * v > limit[j]:
-                        v = limit[j] / jump
-            else:
-                if deviation <= 0 or both_rules:
-                    v = _jerk(nominal[last], nominal[i], ratio[last], ratio[i], limit)
-                    if last_safe > 0.99 * v and safe > 0.99 * v:
-                        v = safe
-                if deviation > 0:
-                    across = acceleration_limit[which[i]]
-                    before, after = _direction(way[last], kind[last]), _direction(way[i], kind[i])
-                    v = min(v, _junction(length[i], across, acceleration[i], before, after, deviation), nominal[i])
-                    v = min(v, nominal[last])
+            if deviation <= 0 or both_rules:
+                v = _jerk(nominal[last], nominal[i], ratio[last], ratio[i], limit)
+                if last_safe > 0.99 * v and safe > 0.99 * v:
+                    v = safe
+            if deviation > 0:
+                across = acceleration_limit[which[i]]
+                before, after = _direction(way[last], kind[last]), _direction(way[i], kind[i])
+                v = min(v, _junction(length[i], across, acceleration[i], before, after, deviation), nominal[i])
+                v = min(v, nominal[last])
             corner[i] = v * v
         last = i
         last_safe = safe

@@ -1,5 +1,5 @@
-"""The planners of Klipper and grblHAL as compiled loops; `replay_kernel` has Marlin and RepRapFirmware, `blend_kernel`
-LinuxCNC.
+"""The planners of Klipper and grblHAL as compiled loops; `replay_kernel` has Marlin, `duet_kernel`
+RepRapFirmware and `blend_kernel` LinuxCNC.
 
 Klipper (`klippy/toolhead.py`, `Move` and `LookAheadQueue`): everything in squared speeds; a corner is a circle through
 X, Y and Z that may not leave it by the junction deviation, extra axes (`extras/manual_stepper.py`, the extruder) bound
@@ -22,6 +22,8 @@ FREE = 99999999.9
 """mm/s² of an extrude-only move before its axes limit it."""
 CRUISE_RATIO = 0.5
 """minimum_cruise_ratio."""
+CREEP = 1.0 / 60.0
+"""MINIMUM_FEED_RATE of grblHAL: 1 unit a minute."""
 STRAIGHT = 0.999999
 """Cosine at which grblHAL takes two moves for one line."""
 Law = tuple[_F, _F, _F, _F, _F, _F, _F]
@@ -66,12 +68,16 @@ def klipper(
                     d = max(d, abs(delta[i, j]))
         if d <= 0:
             continue
+        level = False
+        for j in range(columns):
+            level = level or (linear[j] and j != z and abs(delta[i, j]) > STILL)
         smooth = max_accel * (1.0 - CRUISE_RATIO)
         for j in range(columns):
             r = delta[i, j] / d
             ratio[i, j] = r
-            # X and Y share the limits of the toolhead; the extruder has its own only when it moves alone.
-            bound = j == z or (not linear[j] and (j < columns - 1 or not kinematic[i]))
+            # X and Y share the limits of the toolhead; the extruder has its own where they stand or it draws back
+            # (`kinematics/extruder.py`, check_move).
+            bound = j == z or (not linear[j] and (j < columns - 1 or not level or r < 0))
             if r != 0 and bound:
                 v = min(v, speed_limit[j] / abs(r))
                 a = min(a, acceleration_limit[j] / abs(r))
@@ -215,7 +221,7 @@ def grbl(
             continue
         unit = delta[i] / length[i]
         asked[i] = feed[i] * length[i] if inverse[i] else feed[i]
-        nominal[i] = min(asked[i], _by_axis(speed_limit, unit))
+        nominal[i] = max(min(asked[i], _by_axis(speed_limit, unit)), CREEP)
         acceleration[i] = _by_axis(acceleration_limit, unit)
         if last >= 0 and not stops[i]:
             cos_theta = -(before * unit).sum()

@@ -13,7 +13,7 @@ from trunnion_gcode.planner import Planner
 DIALECT = Dialect(
     name="grblhal",
     metric=all_axes,
-    planner=Planner("grbl", blocks=35),
+    planner=Planner("grbl", blocks=35, slowest=1.0 / 60.0),
     inverse_time=True,
     relative_extrusion=False,
     extruder="U",
