@@ -1,13 +1,15 @@
-"""Orientation smoothing: cones, closed paths, evenness against a general optimiser, what the samples gain."""
+"""Orientation smoothing along paths: cones, closed paths, evenness against a general optimiser, the vertical tool."""
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
 from trunnion_slicer.nonplanar.fair import FAIRING, faired, refined
 from trunnion_slicer.nonplanar.project import Lifted
-from trunnion_slicer.nonplanar.smooth import smoothed
+from trunnion_slicer.nonplanar.smooth import headings, into_cone, smoothed
 
 TOLERANCE = np.radians(2.0)
 
@@ -119,3 +121,76 @@ def test_refined_paths_lay_the_same_at_the_same_places() -> None:
     step = np.linalg.norm(np.diff(fine.points, axis=0), axis=1)
     step[fine.starts[1] - 1] = 0.0
     assert step.max() <= 0.4 + 1e-12
+
+
+def straight(length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n,) and points (n, 3) every 0.2 mm along x."""
+    place = np.arange(0, length, 0.2)
+    return place, np.column_stack([place, np.zeros_like(place), np.zeros_like(place)])
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    seed=st.integers(0, 10_000),
+    tilt=st.floats(0, 1.2),
+    rough=st.floats(0, 0.3),
+    tolerance=st.floats(0.1, 5.0),
+    stray=st.floats(0, 0.2),
+)
+def test_no_axis_ever_leaves_its_cone(seed: int, tilt: float, rough: float, tolerance: float, stray: float) -> None:
+    """Paths with corners and a seam, axes as rough as they come, over the vertical too, and wanted axes anywhere."""
+    random = np.random.default_rng(seed)
+    points = np.cumsum(random.normal(0, 0.2, (90, 3)), axis=0)
+    points[59] = points[20]
+    normals = np.array([np.sin(tilt), 0, np.cos(tilt)]) + random.normal(0, rough, (90, 3))
+    wanted = normals + random.normal(0, stray, (90, 3))
+    normals, wanted = (axes / np.linalg.norm(axes, axis=1, keepdims=True) for axes in (normals, wanted))
+    smooth = smoothed(points, normals, wanted, np.array([0, 20, 60, 90]), np.radians(tolerance))
+    assert between(smooth, normals).max() <= tolerance + 1e-9
+    assert_allclose(np.linalg.norm(smooth, axis=1), 1.0, atol=1e-12)
+
+
+def test_what_turns_evenly_already_is_left_alone() -> None:
+    """A tilt that grows evenly at one heading, and a heading that turns evenly at one tilt."""
+    place, points = straight(30.0)
+    tilt, heading = np.radians(5 + 0.8 * place), np.radians(4 * place)
+    great = np.column_stack([0.6 * np.sin(tilt), 0.8 * np.sin(tilt), np.cos(tilt)])
+    around = np.column_stack([0.2 * np.cos(heading), 0.2 * np.sin(heading), np.full_like(place, np.sqrt(0.96))])
+    for axes in (great, around):
+        assert between(smoothed(points, axes, axes, np.array([0, len(points)]), TOLERANCE), axes).max() < 1e-6
+
+
+@pytest.mark.parametrize("upright", [0.0, 0.3])
+def test_a_flat_top_keeps_its_tool(upright: float) -> None:
+    _, points = straight(10.0)
+    axes = np.tile([np.sin(upright), 0.0, np.cos(upright)], (len(points), 1))
+    assert_allclose(smoothed(points, axes, axes, np.array([0, len(points)]), TOLERANCE), axes, atol=1e-12)
+
+
+@pytest.mark.parametrize(("beside", "less"), [(0.3, 0.01), (1.0, 0.05), (1.9, 0.3), (2.5, 0.4), (4.0, 0.7)])
+def test_a_tool_that_passes_the_vertical_spares_the_platter(beside: float, less: float) -> None:
+    """Within the cone it goes straight over the vertical, else round it on a wider way."""
+    place, points = straight(30.0)
+    tilt = np.radians(0.9 * (place - 15))
+    axes = np.column_stack([np.sin(tilt), np.full_like(place, np.sin(np.radians(beside))), np.cos(tilt)])
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    smooth = smoothed(points, axes, axes, np.array([0, len(points)]), TOLERANCE)
+    asked = [np.abs(np.diff(headings(each, np.array([0, len(points)]), 1e-4), 2)).max() for each in (axes, smooth)]
+    assert asked[1] < less * asked[0]
+
+
+def test_headings_go_on_over_the_vertical_and_round_it() -> None:
+    place, _ = straight(20.0)
+    tilt = np.radians(3 * (place - 10.03))
+    over = np.column_stack([0.6 * np.sin(tilt), 0.8 * np.sin(tilt), np.cos(tilt)])
+    assert_allclose(np.ptp(headings(over, np.array([0, len(over)]), TOLERANCE)), 0.0, atol=1e-9)
+    turn = np.radians(9 * place)
+    around = np.column_stack([0.3 * np.cos(turn), 0.3 * np.sin(turn), np.full_like(turn, np.sqrt(0.91))])
+    assert_allclose(np.diff(headings(around, np.array([0, len(around)]), TOLERANCE)), np.radians(1.8), atol=1e-9)
+
+
+def test_a_cone_is_entered_along_the_great_circle() -> None:
+    centre, axis = np.array([[0.0, 0.0, 1.0]]), np.array([[0.6, 0.0, 0.8]])
+    edge = into_cone(axis, centre, TOLERANCE)
+    assert_allclose(edge, [[np.sin(TOLERANCE), 0, np.cos(TOLERANCE)]], atol=1e-12)
+    assert into_cone(axis, axis, TOLERANCE)[0].tolist() == axis[0].tolist()
