@@ -104,13 +104,38 @@ class Context:
             moved |= np.abs(np.diff(self.motion.path[:, column])) > 1e-9
         return moved
 
-    def surely_moved(self, column: int) -> FloatArray:
-        """(n,) mm or rad that a joint moves on each row at least.
+    @property
+    def linear_way(self) -> FloatArray:
+        """(n,) mm that all linear joints move together."""
+        squared = np.zeros(len(self.motion))
+        for column, joint in enumerate(self.profile.joints):
+            if not joint.rotary:
+                squared += np.diff(self.motion.path[:, column]) ** 2
+        return np.sqrt(squared)
 
-        A firmware that joins rows of a few motor steps to the rows around them turns each a little: so many steps less.
+    @property
+    def driven_length(self) -> FloatArray:
+        """(n,) mm that the tip travels over the part: less than the words say where a joined row's corner is cut."""
+        way = self.linear_way
+        cut = np.divide(self.replay.length, way, out=np.ones(len(way)), where=self.joined & (way > 0))
+        return self.tip_length * np.minimum(cut, 1.0)
+
+    @cached_property
+    def joined(self) -> BoolArray:
+        """(n,) whether the firmware joins the row to others, because it has too few motor steps or follows such a row.
+
+        What it makes of them is one move in a direction of its own, at most so many steps away from the words.
         """
-        few = self.rules.least_steps / self.profile.joints[column].steps_per_unit
-        return np.maximum(np.abs(np.diff(self.motion.path[:, column])) - few, 0.0)
+        few = np.full(len(self.motion), self.rules.least_steps > 0)
+        for column, joint in enumerate(self.profile.joints):
+            few &= np.abs(np.diff(self.motion.path[:, column])) * joint.steps_per_unit < self.rules.least_steps + 1
+        few[1:] |= few[:-1].copy()
+        return few
+
+    def surely_moved(self, column: int) -> FloatArray:
+        """(n,) mm or rad that a joint moves on each row at least, when the firmware has rounded it to motor steps."""
+        step = 1.0 / self.profile.joints[column].steps_per_unit if self.rules.least_steps else 0.0
+        return np.maximum(np.abs(np.diff(self.motion.path[:, column])) - step, 0.0)
 
     @cached_property
     def homing(self) -> BoolArray:

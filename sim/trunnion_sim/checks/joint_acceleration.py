@@ -32,7 +32,7 @@ def check(context: Context) -> Iterator[Finding]:
     changes = (replay.cruise > replay.entry + 1e-9) | (replay.cruise > replay.exit + 1e-9)
     for k, joint in enumerate(profile.joints):
         hard = context.surely_moved(k) / length * replay.acceleration
-        over = (hard > joint.acceleration * (1 + SLACK)) & changes & ~context.homing
+        over = (hard > joint.acceleration * (1 + SLACK)) & changes & ~context.homing & ~context.joined
         yield from context.find(
             "joint-acceleration",
             "error",

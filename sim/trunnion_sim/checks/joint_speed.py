@@ -34,15 +34,16 @@ def check(context: Context) -> Iterator[Finding]:
     """
     replay = context.replay
     length = np.where(replay.length > 0, replay.length, np.inf)
-    still = _linear_way(context) <= context.rules.shortest_linear
+    counts = ~context.homing & ~context.joined
+    still = context.linear_way <= context.rules.shortest_linear
     for k, joint in enumerate(context.profile.joints):
         asked = np.abs(np.diff(context.motion.path[:, k])) / length * replay.asked
         driven = context.surely_moved(k) / length * replay.cruise
         limit = joint.speed * (1 + SPEED_SLACK)
-        over = (asked > limit) & ~context.homing
+        over = (asked > limit) & counts
         if not joint.rotary:
             over &= ~still
-        serious = (over & (context.feeds | joint.rotary)) | ((driven > limit) & ~context.homing)
+        serious = (over & (context.feeds | joint.rotary)) | ((driven > limit) & counts)
         message = partial(_message, joint, asked)
         yield from context.find("joint-speed", "error", serious, message, value=asked, limit=joint.speed, joint=joint)
         yield from context.find(
@@ -62,12 +63,3 @@ def _message(joint: Joint, asked: FloatArray, row: int) -> str:
         f"{joint.letter} is asked for {joint.shown(asked[row]):.4g} {joint.unit}/s, "
         f"it is rated for {joint.shown(joint.speed):g}"
     )
-
-
-def _linear_way(context: Context) -> FloatArray:
-    """(n,) mm that all linear joints move together."""
-    squared = np.zeros(len(context.motion))
-    for k, joint in enumerate(context.profile.joints):
-        if not joint.rotary:
-            squared += np.diff(context.motion.path[:, k]) ** 2
-    return np.sqrt(squared)
