@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from trunnion.pictures import DEVIATION_RANGE, ROLE_COLOURS
 from trunnion_core.profile import MachineProfile
 from trunnion_core.roles import Role
-from trunnion_core.solid_tables import CylinderTable
+from trunnion_core.solid_tables import CylinderTable, HullTable, SolidTable
 from trunnion_sim.report import Report
 
 PARTS = Path(__file__).parent / "report_page"
@@ -91,13 +91,11 @@ def _scene(report: Report, profile: MachineProfile, findings: list[dict[str, Any
         "tool": {
             "tip": profile.tip.tolist(),
             "axis": profile.tool_axis.tolist(),
-            "body": [solid.model_dump() for solid in profile.tool_bodies],
+            "body": [_drawn(solid) for solid in profile.tool_bodies],
         },
-        "bodies": [
-            {"solid": body.solid.model_dump(), "joints": _carriers(profile, body.carried_by)} for body in profile.bodies
-        ],
+        "bodies": [{"solid": _drawn(body.solid), **_carriers(profile, body.carried_by)} for body in profile.bodies],
         "origin": profile.origin.tolist(),
-        "work": [_plate(profile), *(solid.model_dump() for solid in profile.work_bodies)],
+        "work": [_plate(profile), *(_drawn(solid) for solid in profile.work_bodies)],
         "roles": [
             {
                 "name": role_.text.replace("_", " "),
@@ -124,10 +122,27 @@ def _scene(report: Report, profile: MachineProfile, findings: list[dict[str, Any
     return scene
 
 
-def _carriers(profile: MachineProfile, letter: str) -> int:
-    """How many joints of the tool side, from the frame outwards, carry a body: up to the one of that letter."""
-    tool_side = [joint.letter for joint in profile.joints if joint.side == "tool"]
-    return tool_side.index(letter) + 1 if letter in tool_side else 0
+def _carriers(profile: MachineProfile, letter: str) -> dict[str, Any]:
+    """The side whose joints carry a body, and how many of them, from the frame outwards."""
+    sides = {joint.letter: joint.side for joint in profile.joints}
+    side = sides.get(letter, "tool")
+    letters = [joint.letter for joint in profile.joints if joint.side == side]
+    return {"side": side, "joints": letters.index(letter) + 1 if letter in letters else 0}
+
+
+def _drawn(solid: SolidTable) -> dict[str, Any]:
+    """A solid as viewer.js draws it: its own numbers, or the triangles of a hull."""
+    if not isinstance(solid, HullTable):
+        return solid.model_dump()
+    from scipy.spatial import ConvexHull
+
+    points = np.array(solid.points)
+    hull = ConvexHull(points)
+    corners = points[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = (normals * hull.equations[:, :3]).sum(axis=1) < 0
+    corners[inward] = corners[inward][:, ::-1]
+    return {"shape": "hull", "triangles": corners.tolist()}
 
 
 def _plate(profile: MachineProfile) -> dict[str, Any]:

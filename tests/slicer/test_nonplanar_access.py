@@ -1,5 +1,6 @@
 """Which skin the head can reach, against geometry done by hand: walls beside slopes, cones, boxes that turn."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import manifold3d
@@ -9,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from trunnion_core.mesh import Mesh
-from trunnion_core.solid_tables import BoxTable, ConeTable, CylinderTable
+from trunnion_core.profile import Body, load_profile
 from trunnion_core.settings import PrintSettings
+from trunnion_core.solid_tables import BoxTable, ConeTable, CylinderTable, HullTable
 from trunnion_slicer.nonplanar import access
 from trunnion_slicer.nonplanar.access import footprints_of, reachable
 from trunnion_slicer.nonplanar.access_kernel import signed_distance
-from trunnion_slicer.nonplanar.head import frusta
+from trunnion_slicer.nonplanar.head import frusta, head_of
 from trunnion_slicer.nonplanar.material import material, spread_points
 from trunnion_slicer.nonplanar.normals import face_normals
 from trunnion_slicer.nonplanar.plan import plan_nonplanar
@@ -186,6 +188,36 @@ def test_bodies_off_the_axis_are_held_by_their_solids_of_revolution() -> None:
         ]
     )
     np.testing.assert_allclose(bodies, [[12.5, 24, 17, 17], [1, 2, 7, 7]])
+
+
+@settings(deadline=None, max_examples=30)
+@given(seed=st.integers(0, 10_000))
+def test_a_hull_is_held_by_its_frustum_and_a_cone_of_corners_is_itself(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(20, 3)) * 9
+    low, high, narrow, wide = frusta([HullTable(shape="hull", name="h", points=tuple(map(tuple, points)))])[0]
+    assert (low, high) == (points[:, 2].min(), points[:, 2].max())
+    inside = rng.dirichlet(np.ones(20), 200) @ points
+    share = (inside[:, 2] - low) / (high - low)
+    assert (np.hypot(*inside[:, :2].T) <= narrow + share * (wide - narrow) + 1e-7).all()
+    angle = np.arange(12) * np.pi / 6
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    corners = np.concatenate([np.column_stack([r * ring, np.full(12, z)]) for r, z in ((1.0, 2.0), (5.0, 7.0))])
+    cone = HullTable(shape="hull", name="c", points=tuple(map(tuple, corners.tolist())))
+    np.testing.assert_allclose(frusta([cone]), [[2, 7, 1, 5]], atol=1e-7)
+
+
+def test_the_head_is_all_that_moves_with_the_tool_and_nothing_else() -> None:
+    """What the last tool joint carries is seen from the tip; a beam on another joint is the judge's business."""
+    cradle = load_profile("generic_ab_cradle")
+    assert head_of(cradle) == cradle.tool_bodies
+    duct = Body("Z", CylinderTable(shape="cylinder", name="duct", bottom=9, top=12, diameter=6, center=(5, 0)), ())
+    tilted = replace(cradle, bodies=(duct,), tip=np.array([5.0, 0.0, 4.0]))
+    found = frusta(head_of(tilted))[len(cradle.tool_bodies) :]
+    np.testing.assert_allclose(found, [[5, 8, 3, 3]], rtol=0.006)
+    sideways = replace(cradle, bodies=(duct,), tool_axis=np.array([1.0, 0.0, 0.0]))
+    low, high, *_ = frusta(head_of(sideways))[-1]
+    assert (low, high) == pytest.approx((2, 8), abs=0.02)
 
 
 @settings(deadline=None, max_examples=30)

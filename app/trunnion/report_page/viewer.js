@@ -133,6 +133,8 @@ function solid(shape) { // triangles with normals in the shape's own frame
     quad(c(0, 0, 0), c(0, 1, 0), c(1, 1, 0), c(1, 0, 0)); quad(c(0, 0, 1), c(1, 0, 1), c(1, 1, 1), c(0, 1, 1));
     quad(c(0, 0, 0), c(1, 0, 0), c(1, 0, 1), c(0, 0, 1)); quad(c(1, 1, 0), c(0, 1, 0), c(0, 1, 1), c(1, 1, 1));
     quad(c(0, 1, 0), c(0, 0, 0), c(0, 0, 1), c(0, 1, 1)); quad(c(1, 0, 0), c(1, 1, 0), c(1, 1, 1), c(1, 0, 1));
+  } else if (shape.shape === "hull") {
+    for (const [a, b, c] of shape.triangles) quad(a, b, c, c);
   } else {
     const r0 = (shape.diameter ?? shape.bottom_diameter) / 2, r1 = (shape.diameter ?? shape.top_diameter) / 2;
     const [x, y] = shape.center ?? [0, 0], steps = 40;
@@ -179,7 +181,7 @@ const beads = gl && { shape: buffer(beadVertices()), colour: buffer(beadColours(
 const travels = gl && buffer(Float32Array.from(travelRows.flatMap((i) => Array.from(rows.points.subarray(i * 3 - 3, i * 3 + 3)))));
 const tool = gl && facts.tool.body.map((shape) => { const data = solid(shape); return { data: buffer(data), n: data.length / 6 }; });
 const work = gl && facts.work.map((shape) => { const data = solid(shape); return { data: buffer(data), n: data.length / 6 }; });
-const frame = gl && facts.bodies.map((body) => { const data = solid(body.solid); return { data: buffer(data), n: data.length / 6, joints: body.joints }; });
+const frame = gl && facts.bodies.map((body) => { const data = solid(body.solid); return { data: buffer(data), n: data.length / 6, side: body.side, joints: body.joints }; });
 const cloud = gl && deviation && { points: buffer(deviation.points), colour: buffer(Float32Array.from(Array.from(deviation.value).flatMap((v) => {
   const t = Math.min(Math.max(v / facts.deviation.range, -1), 1);
   return t > 0 ? [0.95, 0.95 - 0.75 * t, 0.95 - 0.8 * t] : [0.95 + 0.8 * t, 0.95 + 0.6 * t, 0.95];
@@ -245,7 +247,7 @@ function draw() {
   if (byId("machine").checked) {
     gl.enable(gl.BLEND); gl.enable(gl.CULL_FACE); gl.depthMask(false); gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE); attribute(2, null);
     const toView = inPart ? rigidInverse(machineFromPart) : identity();
-    const carried = frame.map((body) => [[body], multiply(toView, side("tool", q, body.joints)), [0.45, 0.5, 0.55], 0.35]);
+    const carried = frame.map((body) => [[body], multiply(toView, side(body.side, q, body.joints)), [0.45, 0.5, 0.55], 0.35]);
     for (const [bodies, model, colour, alpha] of [...carried, [work, partModel, [0.55, 0.57, 0.6], 0.3], [tool, toolModel, [0.75, 0.6, 0.35], 0.45]]) {
       gl.uniformMatrix4fv(uniforms.model, false, model); gl.uniform1f(uniforms.alpha, alpha); gl.vertexAttrib3f(2, ...colour);
       for (const body of bodies) { attribute(0, body.data, 24, 0); attribute(1, body.data, 24, 12); gl.drawArrays(gl.TRIANGLES, 0, body.n); }

@@ -30,6 +30,8 @@ PRESS = 0.1 + 1e-4
 and the rounding of heights, so that a step down by exactly 0.1 is not decided by it."""
 SMALLEST_STEP = 0.05
 """mm that no point of a body moves beyond between two poses that decide."""
+DEEPER = 0.1
+"""Share by which a place has to be deeper than the deepest known to be looked for."""
 CELL = 0.25
 """mm between samples of what is printed: finer than a bead is wide, so that no bead falls between two."""
 BLOCK = 8
@@ -64,8 +66,8 @@ def empty_field(low: FloatArray, high: FloatArray) -> Field:
 def enter(before: Any, after: Any, b: Any, chain: Any, bodies: Any, field: Any, found: Any) -> Any:
     """Smallest distance in mm of body b from what is printed, over the motion of the joints from `before` to `after`.
 
-    Negative where it enters; FAR where it is never near enough to be measured. found (3,) receives the place, and the
-    second result is how many poses were looked at.
+    Negative where it enters, to within DEEPER and SMALLEST_STEP of the deepest; FAR where it is never near enough to be
+    measured. found (3,) receives the place, and the second result is how many poses were looked at.
     """
     rotation, shift = np.empty((3, 3)), np.empty(3)
     first, last, here = np.empty(3), np.empty(3), np.empty(3)
@@ -110,16 +112,19 @@ def enter(before: Any, after: Any, b: Any, chain: Any, bodies: Any, field: Any, 
                 axial = abs(rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz) / 2.0
                 lean = angle / 2.0
                 press = PRESS - axial - bow - chord * angle / 4.0
-        want = SMALLEST_STEP if decides else motion
+        # once something is entered, only what is noticeably deeper matters
+        deeper = min(worst + DEEPER * worst - SMALLEST_STEP, 0.0) if worst < 0.0 else 0.0
+        want = min(worst, SMALLEST_STEP) if decides else motion + deeper
         near = _nearest(b, bodies, rotation, shift, press, lean, field, want, here)
-        if not decides:
-            if near < motion:
-                stack[waiting, 0], stack[waiting, 1] = begin, middle
-                stack[waiting + 1, 0], stack[waiting + 1, 1] = middle, end
-                waiting += 2
-        elif near < min(worst, SMALLEST_STEP):
+        if near >= want:
+            continue
+        if decides:
             worst = near
             found[:] = here
+        else:
+            stack[waiting, 0], stack[waiting, 1] = begin, middle
+            stack[waiting + 1, 0], stack[waiting + 1, 1] = middle, end
+            waiting += 2
     return worst, poses
 
 
