@@ -27,10 +27,12 @@ from trunnion_kinematics.chain import JointChain
 from trunnion_motion.executed import Execution, executed
 from trunnion_motion.timelaw import TimeLaw
 
-PIECE = 0.008
-"""s. Ramps are cut into pieces of about this length, which is short beside any pressure advance worth the name."""
+PIECE = 0.006
+"""s. Ramps are cut into pieces of this length at least: short beside any pressure advance worth the name."""
 MOST_PIECES = 4
 """Of one ramp. A quarter of the speed apart, flow strays by a sixteenth of it in the first piece, less in others."""
+LEAST_CUT = 0.1
+"""mm. Where linear joints move less, but do move, pieces would be lost in the rounding of the words that F is about."""
 PASSES = 2
 """Law and filament are worked out from each other so many times; a third changes nothing that words could say."""
 
@@ -62,29 +64,33 @@ def with_advance(
 ) -> Advanced:
     """The program with its beads' rows cut at their ramps, and with extruder.pressure_advance in its filament.
 
-    `program.cruise` and `ideal` are what `executed` takes, `execution` what it made of them; `tool_axes` (n, 3) unit,
+    `program.cruise` and `ideal` are what `executed` took, `execution` what it made of them; `tool_axes` (n, 3) unit,
     part, at the rows' ends. The sum of the filament stays what it was. For a planner that stops where filament turns
     back (`Dialect.draws_back`) such rows of beads feed forwards only, and what that leaves over goes into the next row
     that may draw back, at the latest the retraction.
     """
     seconds = profile.extruder.pressure_advance
-    turning = (_moved(program, profile, "XYZ") == 0) & (dialect.planner.corners == "klipper")
-    row, end = _cuts(program, execution.law, turning, dialect)
-    program, ideal = _cut(program, ideal, row, end, profile)
+    if dialect.planner.corners != "blend":
+        program = replace(program, cruise=execution.asked)
+    linear = _moved(program, profile, "XYZ")
+    turning = (linear == 0) & (dialect.planner.corners == "klipper")
+    whole = turning | ((linear > 0) & (linear < LEAST_CUT)) | _too_sharp(program, execution.law, profile)
+    row, end = _cuts(program, execution.law, whole, profile, dialect)
+    program, ideal = _cut(program, ideal, row, end, profile, dialect)
     axes, turning = tool_axes[row], turning[row]
     inside = end < 1.0
     axes[inside] = JointChain.from_profile(profile).forward(program.joints[inside])[1]
     nominal = program.filament
     program = replace(program, advance=seconds)
     forwards = (program.width > 0) & (nominal > 0) & (_moved(program, profile, dialect.advance_axes) > 0)
-    done = executed(program, ideal, profile, dialect)
+    done = executed(program, ideal, profile, dialect, bends=0)
     for _ in range(PASSES):
         ahead = _ahead(program, nominal, done.law, turning, seconds)
         place = np.cumsum(nominal) + _gradual(ahead, done.law, JUMP_SHARE * profile.extruder.corner_speed)
         if not dialect.draws_back:
             place = _forwards(place, program, forwards, 2 * 10.0**-profile.gcode.decimals_extruder)
         program = replace(program, filament=np.diff(place, prepend=0.0))
-        done = executed(program, ideal, profile, dialect)
+        done = executed(program, ideal, profile, dialect, bends=0)
     return Advanced(program, done, nominal, program.tip[1:], axes)
 
 
@@ -95,44 +101,101 @@ def _moved(program: MachineProgram, profile: MachineProfile, letters: str) -> Fl
     return np.where(way < 0.5 * 10.0**-profile.gcode.decimals_linear, 0.0, way)
 
 
-def _cuts(program: MachineProgram, law: TimeLaw, turning: BoolArray, dialect: Dialect) -> tuple[IntArray, FloatArray]:
-    """Row (m,) and end (m,) of every piece, as a fraction of the row's length; the last of a row ends at 1."""
+def _too_sharp(program: MachineProgram, law: TimeLaw, profile: MachineProfile) -> BoolArray:
+    """(n,) rows that speed up and brake at once, where a drive that follows both would jump too far in between."""
+    extruder = profile.extruder
+    per_length = np.divide(program.filament, law.length, out=np.zeros(len(program)), where=law.length > 0)
+    jump = 2 * extruder.pressure_advance * np.abs(per_length) * law.acceleration
+    ramps = np.where(law.acceleration > 0, law.acceleration, 1.0) * (law.duration - PIECE)
+    brief = ramps < 2 * law.peak - law.entry - law.leave
+    return np.asarray(
+        brief & (law.peak > law.entry) & (law.peak > law.leave) & (jump > JUMP_SHARE * extruder.corner_speed)
+    )
+
+
+def _cuts(
+    program: MachineProgram, law: TimeLaw, whole: BoolArray, profile: MachineProfile, dialect: Dialect
+) -> tuple[IntArray, FloatArray]:
+    """Row (m,) and end (m,) of every piece, as a fraction of the row's length; the last of a row ends at 1.
+
+    Rows of beads are cut, except those that shall stay `whole` (n,).
+    """
     n = len(program)
-    bead = (program.width > 0) & (program.filament > 0) & (law.duration > 0) & ~turning
+    bead = (program.width > 0) & (program.filament > 0) & (law.duration > 0) & ~whole
     length, ramp = np.where(bead, law.length, 1.0), np.where(bead, law.acceleration, 1.0)
-    rows, ends = [np.arange(n)], [np.ones(n)]
-    for slow, towards_end in ((law.entry, False), (law.leave, True)):
-        if dialect.planner.corners == "blend":
-            # A move reaches its speed over half its length or not at all, so a piece spans the ramp twice.
-            reach = (law.peak**2 - slow**2) / ramp
-            cut = np.flatnonzero(bead & (reach > 0) & (reach + 2 * law.peak**2 / ramp < length))
-            places = [reach[cut] / length[cut]]
-            cuts = [cut]
-        else:
-            time = np.where(bead, (law.peak - slow) / ramp, 0.0)
-            count = np.clip(np.ceil(time / PIECE), 0, MOST_PIECES).astype(np.int64)
-            count[time < 0.5 * PIECE] = 0
-            cuts = [np.flatnonzero(count >= step) for step in range(1, MOST_PIECES + 1)]
-            places = []
-            for step, cut in enumerate(cuts, start=1):
-                speed = slow[cut] + (law.peak[cut] - slow[cut]) * step / count[cut]
-                places.append((speed**2 - slow[cut] ** 2) / (2 * ramp[cut] * length[cut]))
-        rows += cuts
-        ends += [1.0 - place if towards_end else place for place in places]
-    row, end = np.concatenate(rows), np.concatenate(ends)
-    # Cuts at the very ends of a row, and the top of a triangle seen from both sides, are none or one.
-    kept = (end == 1.0) | ((end > 1e-6) & (end < 1 - 1e-6))
-    row, end = row[kept], end[kept]
+    if dialect.planner.corners == "blend":
+        reach = np.where(bead, law.peak**2, 0.0) / (0.5 * _push(program, length, profile))
+        up, down = (_blend_ends(slow, law.peak, reach, length) for slow in (law.entry, law.leave))
+    else:
+        least = _least_asked(profile, dialect)
+        rising, falling = (np.where(bead, (law.peak - slow) / ramp, 0.0) for slow in (law.entry, law.leave))
+        between = law.duration - rising - falling
+        counts = []
+        for time, slow in ((rising, law.entry), (falling, law.leave)):
+            asked = 0.5 * (slow + law.peak) * time / length * program.cruise
+            counts.append(np.minimum(np.minimum(time / PIECE, np.sqrt(asked / least)), MOST_PIECES).astype(np.int64))
+        # Where a short piece would be left beside the top of a ramp, there is no cut at it.
+        alone = (counts[1] == 0) & (between + falling < 0.5 * PIECE)
+        meet = np.where(counts[0] == 0, rising + between, between) < 0.5 * PIECE
+        up = _ramp_ends(law.entry, law.peak, ramp, length, counts[0], counts[0] - alone)
+        down = _ramp_ends(law.leave, law.peak, ramp, length, counts[1], counts[1] - meet)
+    row = np.concatenate([np.arange(n), up[0], down[0]])
+    end = np.concatenate([np.ones(n), up[1], 1.0 - down[1]])
     order = np.lexsort((end, row))
-    row, end = row[order], end[order]
-    again = (np.diff(row, append=-1) == 0) & (np.diff(end, append=2.0) < 1e-6)
-    return row[~again], end[~again]
+    return row[order], end[order]
+
+
+def _least_asked(profile: MachineProfile, dialect: Dialect) -> float:
+    """s that F asks for the first piece of a ramp, at least: there a rounded step more or less must not be a corner.
+
+    A ramp from rest in n equal times has its first piece in 1 / n² of its length.
+    """
+    steps = np.array([joint.steps_per_unit for joint in profile.joints])
+    return 1.0 / float((steps * profile.array("corner_speed")).min()) if dialect.planner.in_steps else 1e-9
+
+
+def _ramp_ends(
+    slow: FloatArray, fast: FloatArray, ramp: FloatArray, length: FloatArray, count: IntArray, cuts: IntArray
+) -> tuple[IntArray, FloatArray]:
+    """Rows and fractions of their lengths, from the slow end: first `cuts` ends of `count` equal parts of a ramp."""
+    rows = [np.flatnonzero(cuts >= step) for step in range(1, MOST_PIECES + 1)]
+    ends = []
+    for step, row in enumerate(rows, start=1):
+        speed = slow[row] + (fast[row] - slow[row]) * step / count[row]
+        ends.append((speed**2 - slow[row] ** 2) / (2 * ramp[row] * length[row]))
+    return np.concatenate(rows), np.concatenate(ends)
+
+
+def _blend_ends(
+    slow: FloatArray, fast: FloatArray, reach: FloatArray, length: FloatArray
+) -> tuple[IntArray, FloatArray]:
+    """The same for moves that overlap: one that is no longer than its `reach` (n,) would not come to its speed."""
+    row = np.flatnonzero((reach > 0) & (slow < 0.9 * fast) & (3 * reach < length))
+    return row, reach[row] / length[row]
+
+
+def _push(program: MachineProgram, length: FloatArray, profile: MachineProfile) -> FloatArray:
+    """(n,) acceleration along `length` (n,) that every joint and the drive can give."""
+    joints = np.diff(program.joints, axis=0, prepend=program.start[None])
+    steps = np.abs(np.column_stack([joints, program.filament]))
+    most = np.append(profile.array("acceleration"), profile.extruder.acceleration)
+    with np.errstate(divide="ignore"):
+        return np.asarray((most / steps).min(axis=1) * length)
 
 
 def _cut(
-    program: MachineProgram, ideal: TimeLaw, row: IntArray, end: FloatArray, profile: MachineProfile
+    program: MachineProgram,
+    ideal: TimeLaw,
+    row: IntArray,
+    end: FloatArray,
+    profile: MachineProfile,
+    dialect: Dialect,
 ) -> tuple[MachineProgram, TimeLaw]:
-    """Both with their rows cut: joints and what a row holds in proportion, tips where the joints take them."""
+    """Both with their rows cut: joints in proportion, tips where the joints take them, and the rest by the tip's way.
+
+    A joint that turns moves the tip a little faster at one end of a row than at the other, and not quite straight, but
+    for firmware that is told tips.
+    """
     first = np.diff(row, prepend=-1) > 0
     share = end - np.where(first, 0.0, np.roll(end, 1))
     before = np.concatenate([program.start[None], program.joints[:-1]])[row]
@@ -140,26 +203,33 @@ def _cut(
     inside = end < 1.0
     joints[inside] = before[inside] + end[inside, None] * (joints[inside] - before[inside])
     tip = np.concatenate([program.tip[:1], program.tip[1:][row]])
-    tip[1:][inside] = JointChain.from_profile(profile).forward(joints[inside])[0]
+    if dialect.tip_words:
+        began = program.tip[:-1][row][inside]
+        tip[1:][inside] = began + end[inside, None] * (tip[1:][inside] - began)
+    else:
+        tip[1:][inside] = JointChain.from_profile(profile).forward(joints[inside])[0]
+    way = np.linalg.norm(np.diff(tip, axis=0), axis=1)
+    whole = np.bincount(row, weights=way, minlength=len(program))[row]
+    part = np.where(whole > 0, way / np.where(whole > 0, whole, 1.0), share)
     starts = np.append(np.flatnonzero(first), len(row))
     cut = replace(
         program,
         joints=joints,
         duration=program.duration[row] * share,
-        filament=program.filament[row] * share,
+        filament=program.filament[row] * part,
         role=program.role[row],
         layer=program.layer[row],
         width=program.width[row],
         height=program.height[row],
         tip_speed=program.tip_speed[row],
-        tip_length=program.tip_length[row] * share,
+        tip_length=program.tip_length[row] * part,
         source=program.source[row],
         events=tuple(replace(event, row=int(starts[event.row])) for event in program.events),
         cruise=program.cruise[row] * share,
         tip=tip,
     )
     law = TimeLaw(**{field.name: getattr(ideal, field.name)[row] for field in fields(TimeLaw)})
-    return cut, replace(law, duration=law.duration * share, length=law.length * share)
+    return cut, replace(law, duration=law.duration * share, length=law.length * part)
 
 
 def _ahead(

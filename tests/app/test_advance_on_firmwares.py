@@ -21,6 +21,8 @@ SETTINGS = PrintSettings(layer_height=0.3, extrusion_width=0.4)
 FIRMWARES = ("marlin", "reprapfirmware", "grblhal", "klipper", "linuxcnc")
 AT_SPEED = ("marlin", "reprapfirmware", "grblhal")
 """Those that go through the rows of a ring without slowing down; where every row slows down, lag shows less."""
+WITHIN = {"linuxcnc": 0.08}
+"""Of the section wanted, over two rows; 0.05 elsewhere. LinuxCNC lets rows overlap, so their ends are no corners."""
 OFF = {"marlin": "M900 K0", "reprapfirmware": "M572 D0 S0", "klipper": "SET_PRESSURE_ADVANCE ADVANCE=0"}
 K = 0.05
 ROWS, RADIUS = 150, 15.0
@@ -96,8 +98,7 @@ def test_flow_is_right_when_only_the_platter_turns(firmware: str, tmp_path: Path
     steps = np.abs(context.motion.joints - context.motion.before)[turning]
     assert steps[:, [profile.letters.index(letter) for letter in "XYZ"]].max() == 0
     found = sections(context)
-    assert np.abs(found[1:-1] - 1).max() < 0.05
-    assert np.abs(found - 1).max() < 0.1
+    assert np.abs(found - 1).max() < WITHIN.get(firmware, 0.05)
     assert off(file, profile) == 0
     assert not {"bead-without-plastic", "unknown-command"} & set(judge(file, profile).counts)
     plain = context_of(written(tmp_path, firmware, 0.0), profile).motion.filament
