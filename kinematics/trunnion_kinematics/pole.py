@@ -13,8 +13,11 @@ from trunnion_core.profile import MachineProfile
 from trunnion_kinematics.chain import JointChain
 from trunnion_kinematics.reach import outside_limits
 
-FULL_TOLERANCE, NO_TOLERANCE = 4.0, 8.0
-"""Angle from the pole, in tolerances, up to which the tolerance is used in full, and from which it is not used."""
+FULL_USE = np.radians(20.0)
+"""Angle from the pole up to which the tolerance is used in full, or twice the tolerance if that is more.
+
+From twice this angle on it is not used: rotary 1 turns slowly there. Between the two it dwindles; the slower it does,
+the less rotary 1 has to hurry back to the wanted axes."""
 
 MOVED = 1e-12
 """rad. Rows whose angle changes less are left exactly as they were."""
@@ -70,8 +73,8 @@ def tube(
     f2 = float(np.arccos(np.clip(w2 @ chain.tool_axis, -1, 1)))
     k1 = tool_axes @ w1
     r = np.maximum(chain.pole_sine(tool_axes), 1e-300)
-    from_pole = np.arcsin(np.minimum(r, 1.0)) / axis_tolerance
-    tolerance = axis_tolerance * np.clip((NO_TOLERANCE - from_pole) / (NO_TOLERANCE - FULL_TOLERANCE), 0, 1)
+    full = max(FULL_USE, 2 * axis_tolerance)
+    tolerance = axis_tolerance * np.clip(2 - np.arcsin(np.minimum(r, 1.0)) / full, 0, 1)
 
     def half_width(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
         cosine = (np.cos(np.clip(angle, 0, np.pi)) - g * k1) / (sine * r)
