@@ -83,18 +83,20 @@ class Reader:
     def _blocks(self, file: BinaryIO) -> Iterator[Block]:
         line = 1
         rest = b""
-        skipping = False
+        skipped = 0  # bytes of the endless line that is being passed over
         while True:
             piece = file.read(CHUNK)
             if not piece:
                 break
-            if skipping:
+            if skipped:
                 cut = piece.find(b"\n")
+                skipped += len(piece) if cut < 0 else cut
                 if cut < 0:
                     continue
+                yield _overlong(line, skipped)
                 piece = piece[cut + 1 :]
                 line += 1
-                skipping = False
+                skipped = 0
             data = rest + piece
             end = data.rfind(b"\n") + 1
             if end:
@@ -103,15 +105,15 @@ class Reader:
                 yield block
             rest = data[end:]
             if len(rest) > LONGEST_LINE:
-                yield _overlong(line, len(rest))
-                rest, skipping = b"", True
-        if skipping:
+                rest, skipped = b"", len(rest)
+        if skipped:
+            yield _overlong(line, skipped)
             line += 1
         elif rest:
             block, _ = _parse(rest + b"\n", line)
             yield block
             line += 1
-        torn = bool(rest) or skipping
+        torn = bool(rest) or skipped > 0
         self.end = FileEnd(line - 1, not torn, rest[:200])
 
 
