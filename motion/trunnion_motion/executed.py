@@ -15,6 +15,7 @@ from trunnion_core.program import MachineProgram
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.feed import speeds_read
 from trunnion_gcode.moves import Moves, make_moves
+from trunnion_gcode.stated import Toolhead, toolhead
 from trunnion_motion import executed_kernel as kernel
 from trunnion_motion.overlapping import Path, overlapping
 from trunnion_motion.timelaw import TimeLaw
@@ -101,28 +102,6 @@ def _blended(program: MachineProgram, ideal: TimeLaw, moves: Moves, drive: "_Dri
     return _per_row(program, ideal, moves, _Trapezoids(*ramps, asked))
 
 
-@dataclass(frozen=True)
-class KlipperConfig:
-    """What Klipper's [printer] section is taken to say about a machine of this profile."""
-
-    speed: float
-    """max_velocity: the fastest of the linear joints, mm/s."""
-    acceleration: float
-    """max_accel: that of the profile's planner, else of the weakest linear joint but Z, mm/s²."""
-    deviation: float
-    """mm, from square_corner_velocity, the smallest corner speed of the linear joints but Z."""
-
-
-def klipper_config(profile: MachineProfile) -> KlipperConfig:
-    """Klipper knows one speed and acceleration for X and Y together, so the weaker joint speaks for both."""
-    plane = [joint for joint in profile.joints if not joint.rotary and joint.letter != "Z"]
-    given = profile.planner.acceleration
-    acceleration = min(joint.acceleration for joint in plane) if given is None else given
-    square = min(joint.corner_speed for joint in plane)
-    fastest = max(joint.speed for joint in profile.joints if not joint.rotary)
-    return KlipperConfig(fastest, acceleration, square**2 * (np.sqrt(2) - 1) / acceleration)
-
-
 @dataclass(frozen=True, eq=False)
 class _Drive:
     """Moves as the planner sees them, along its own length: mm, degrees, or mm of filament."""
@@ -151,7 +130,7 @@ class _Drive:
     """(k + 1,) which columns are linear joints."""
     deviation: float | None
     """mm of junction deviation, where the profile gives one."""
-    config: "KlipperConfig"
+    config: Toolhead
     letters: tuple[str, ...]
     """k of the joints."""
 
@@ -202,7 +181,7 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
     if dialect.planner.corners in ("grbl", "blend"):
         along = np.full(len(along), UNLIMITED)
     linear = np.array([not joint.rotary for joint in profile.joints] + [False])
-    config = klipper_config(profile)
+    config = toolhead(profile)
     if dialect.planner.corners == "klipper":
         straight = (kind & 2) > 0
         along = np.where(straight, config.acceleration, KLIPPER_UNLIMITED)

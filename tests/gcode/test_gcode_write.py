@@ -353,7 +353,7 @@ def test_a_slow_move_lowers_repraps_minimum_speed_first() -> None:
     text = written(ring(profile, 0.003), profile)
     permission = next(line for line in text.splitlines() if line.startswith("M203 I"))
     assert 0 < float(permission[6:]) < 60 * 0.3
-    assert "M203" not in written(ring(profile, 0.0), profile)
+    assert "M203 I" not in written(ring(profile, 0.0), profile)
 
 
 def test_a_move_in_no_time_is_refused() -> None:

@@ -6,9 +6,30 @@ no E word: filament is absolute U from 0, whose steps, rate and acceleration are
 so travels are G1 as well. Heaters and fan need plugins that take the M codes of printers.
 """
 
+from trunnion_core.profile import MachineProfile
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.metrics import all_axes
 from trunnion_gcode.planner import Planner
+from trunnion_gcode.stated import MINUTE, RELIES, said
+
+AXES = "XYZABCUV"
+"""Order of the axes in the settings."""
+
+
+def setup(profile: MachineProfile) -> tuple[str, ...]:
+    """Settings $11, $110 to $117 (units/min) and $120 to $127 (units/s²)."""
+    deviation = profile.planner.junction_deviation
+    limits = [(joint.letter, joint.shown(joint.speed), joint.shown(joint.acceleration)) for joint in profile.joints]
+    limits.append(("U", profile.extruder.speed, profile.extruder.acceleration))
+    places = [(AXES.index(letter), v, a) for letter, v, a in limits if letter in AXES]
+    return (
+        f"{RELIES} $11={said(DEVIATION if deviation is None else deviation)}",
+        *(f"{RELIES} $11{place}={said(v * MINUTE)} $12{place}={said(a)}" for place, v, a in sorted(places)),
+    )
+
+
+DEVIATION = 0.01
+"""mm. What grblHAL is shipped with, where the profile gives no junction deviation."""
 
 DIALECT = Dialect(
     name="grblhal",
@@ -24,4 +45,5 @@ DIALECT = Dialect(
     checksums=False,
     shortest=2e-3,
     max_line=250,
+    setup=setup,
 )

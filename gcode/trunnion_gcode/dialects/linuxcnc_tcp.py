@@ -9,6 +9,7 @@ import dataclasses
 
 from trunnion_core.profile import MachineProfile
 from trunnion_gcode.dialects import linuxcnc
+from trunnion_gcode.stated import RELIES
 from trunnion_gcode.tables import pivots, table_problem, turning_signs
 from trunnion_gcode.words import number
 
@@ -31,9 +32,10 @@ def setup(profile: MachineProfile) -> tuple[str, ...]:
     pins = (f"; setp {name}.{pin} {number(pin, v, 4)}" for pin, v in zip(PINS, (*zero, *offset), strict=True))
     conventional = 0 if turning_signs(profile) == {1} else 1
     return (
-        f"; linuxcnc needs: KINEMATICS = {name} coordinates=xyz{tilt}cu",
+        f"{RELIES} [KINS] KINEMATICS = {name} coordinates=xyz{tilt}cu",
         *pins,
         f"; setp {name}.conventional-directions {conventional}",
+        *linuxcnc.axes(profile),
     )
 
 

@@ -10,19 +10,21 @@ import functools
 
 from trunnion_core.profile import MachineProfile
 from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.dialects import marlin
 from trunnion_gcode.dialects.marlin import SHORTEST_LINEAR
 from trunnion_gcode.metrics import linear_first
 from trunnion_gcode.planner import Planner
+from trunnion_gcode.stated import RELIES
 from trunnion_gcode.tables import pivots, table_problem
 from trunnion_gcode.words import number
 
 
 def setup(profile: MachineProfile) -> tuple[str, ...]:
-    """Which geometry the firmware must have been told."""
+    """Which geometry the firmware must have been told, besides its limits."""
     names = ("X", "Y", "Z", "I", "J", "K")
     zero, offset = pivots(profile)
     words = " ".join(f"{name}{number(name, v, 4)}" for name, v in zip(names, (*zero, *offset), strict=True))
-    return (f"; the firmware must have been told M665 {words}",)
+    return (f"{RELIES} M665 {words}", *marlin.setup(profile))
 
 
 DIALECT = Dialect(
