@@ -132,7 +132,10 @@ class ExtruderTable(Table):
     min_flow: float = Field(0.0, ge=0, description="Slowest steady flow, mm³/s.")
     max_flow: float = Field(12.0, gt=0, description="Fastest flow the hot end can melt, mm³/s.")
     pressure_advance: float = Field(
-        0.0, ge=0, description="s, handed to the firmware; at 0 the program leaves the firmware's own setting alone."
+        0.0,
+        ge=0,
+        description="s by which filament is ahead of its flow: handed to the firmware, or in the filament words where "
+        "the firmware would not apply it. At 0 the program leaves the firmware's own setting alone.",
     )
 
 
