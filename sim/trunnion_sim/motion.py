@@ -20,7 +20,8 @@ from trunnion_sim import motion_kernel as kernel
 from trunnion_sim.reader import Block
 from trunnion_sim.row_store import RowStore
 from trunnion_sim.rules import Rules
-from trunnion_sim.tip_rows import cut_words, joints_of_tips, pieces_of_tips
+from trunnion_sim.tip_control import SEGMENTS_PER_SECOND, TipControl, told
+from trunnion_sim.tip_rows import cut_words, joints_of_tips, pieces_in_time, pieces_of_tips
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ KEPT = (
         ("M", n * 10)
         for n in (
             *(0, 1, 82, 83, 104, 109, 112, 116, 140, 190, 191, 200, 201, 203, 204, 205, 302),
-            *(566, 568, 572, 600, 900),
+            *(566, 568, 572, 600, 665, 900),
         )
     }
     | {("G", n * 10) for n in (4, 10, 20, 28, 29, 49, 90, 91, 92, 93, 94)}
@@ -170,7 +171,7 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
     path /= profile.to_shown
     of_tip = _of_tip(commands, rows.kind, rules)
     if of_tip.any():
-        rows, path, of_tip, commands = _followed(profile, rows, path[0], of_tip, commands)
+        rows, path, of_tip, commands = _followed(profile, rows, path[0], of_tip, commands, rules)
     return Motion(
         line=rows.line,
         kind=rows.kind,
@@ -201,16 +202,39 @@ def _of_tip(commands: list[Command], kind: NDArray[np.uint8], rules: Rules) -> B
 
 
 def _followed(
-    profile: MachineProfile, rows: kernel.Rows, start: FloatArray, of_tip: BoolArray, commands: list[Command]
+    profile: MachineProfile,
+    rows: kernel.Rows,
+    start: FloatArray,
+    of_tip: BoolArray,
+    commands: list[Command],
+    rules: Rules,
 ) -> tuple[kernel.Rows, FloatArray, BoolArray, list[Command]]:
     """Rows, path, which rows name the tip, and commands, when rows that name the tip are followed in joints."""
-    joints = joints_of_tips(profile, rows.joints, of_tip)
+    joints = joints_of_tips(profile, rows.joints, of_tip, _told(profile, commands))
     pieces = pieces_of_tips(profile, start, joints, of_tip, rows.filament > 0)
+    if rules.tip_words == "G43.4":
+        per_second = np.full(len(joints), SEGMENTS_PER_SECOND)
+        for command in commands:
+            if command.name == "M665" and (value := command.get("S")) is not None and value > 0:
+                per_second[command.row :] = value
+        timed = pieces_in_time(
+            profile, start, joints, rows.filament, of_tip, rows.feed, per_second, rules.least_steps
+        )  # fmt: skip
+        pieces = np.maximum(pieces, timed)
     if (pieces > 1).any():
         rows, commands = _cut(profile, start, joints, rows, pieces, commands)
         of_tip = np.repeat(of_tip, pieces)
-        joints = joints_of_tips(profile, rows.joints, of_tip)
+        joints = joints_of_tips(profile, rows.joints, of_tip, _told(profile, commands))
     return rows, np.concatenate([start[None], joints]), of_tip, commands
+
+
+def _told(profile: MachineProfile, commands: list[Command]) -> list[tuple[int, TipControl]]:
+    """Rows from which on M665 makes the firmware believe in another geometry, and that."""
+    telling = [
+        command for command in commands if command.name == "M665" and any(c in "XYZIJK" for c, _ in command.words)
+    ]
+    believed = told(profile, [dict(command.words) for command in telling])
+    return [(command.row, control) for command, control in zip(telling, believed, strict=True)]
 
 
 def _cut(

@@ -7,7 +7,7 @@ is cut into `segments_per_second` pieces (`motion.cpp`, `line_to_destination_kin
 rotary joints come from the profile: the branches of the fork disagree on them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -55,6 +55,12 @@ class TipControl:
         """(k,) joints that take the tip to `native` (k,), mm and degrees, and whether all are in their travel."""
         out = np.array(native, dtype=np.float64)
         return out, bool(tip_kernel.to_joints(self.geometry, out.copy(), out))
+
+    def many(self, native: FloatArray) -> FloatArray:
+        """(n, k) joints of n rows of native values, mm and degrees, whether they are in their travel or not."""
+        out = np.empty_like(native)
+        tip_kernel.all_to_joints(self.geometry, np.ascontiguousarray(native), out)
+        return out
 
     def native(self, joints: FloatArray) -> FloatArray:
         """(k,) tip over the part and angles at `joints` (k,), mm and degrees."""
@@ -108,6 +114,17 @@ class TipControl:
     def _arm(self) -> float:
         g = self.geometry
         return float(np.linalg.norm(g.point[self._tilting] - g.tip))
+
+
+def told(profile: MachineProfile, words: Sequence[Mapping[str, float]]) -> list[TipControl]:
+    """The geometries that the firmware believes in after each of the M665 with these words."""
+    believed = []
+    for i in range(len(words)):
+        control = TipControl(profile)
+        for each in words[: i + 1]:
+            control.set(each)
+        believed.append(control)
+    return believed
 
 
 def tip_control_of(profile: MachineProfile) -> TipControl | None:

@@ -96,6 +96,13 @@ def to_joints(g: Geometry, native: _F, joints: _F) -> bool:
 
 
 @njit(cache=True)
+def all_to_joints(g: Geometry, native: _F, joints: _F) -> None:
+    """`to_joints` for every row of `native` (n, k)."""
+    for i in range(len(native)):
+        to_joints(g, native[i], joints[i])
+
+
+@njit(cache=True)
 def pieces(g: Geometry, begin: _F, goal: _F, filament: float, feed: float, per_second: float) -> tuple[int, float]:
     """Pieces that a move from one native row to another is cut into, and the length that F is read over.
 

@@ -7,12 +7,17 @@ small pieces, so a row whose joints would take the tip off its line is cut; rows
 tolerance stay whole.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_sim.chain import forward
+from trunnion_sim.tip_control import TipControl
 
+SHORTEST = 1e-3
+"""mm: F is read over the turn of rotaries where the tip moves no farther."""
 MOST_OFF = 0.05
 """mm that the tip may leave its line between the ends of a row that feeds and stays whole."""
 MOST_OFF_IN_AIR = 0.5
@@ -20,11 +25,16 @@ MOST_OFF_IN_AIR = 0.5
 FOLLOWED = 0.01
 """mm that it may between the ends of a piece."""
 MOST_PIECES = 2000
+LONGEST_ROW = 65535
+"""Pieces that Marlin cuts a move into at most."""
 
 
-def joints_of_tips(profile: MachineProfile, words: FloatArray, named: BoolArray) -> FloatArray:
+def joints_of_tips(
+    profile: MachineProfile, words: FloatArray, named: BoolArray, told: Sequence[tuple[int, TipControl]] = ()
+) -> FloatArray:
     """(n, k) joints, mm or rad, for `words` (n, k) of which rows `named` (n,) hold the tip under the linear letters.
 
+    From the rows in `told` on, the firmware believes in another geometry than the profile's, and so moves other joints.
     A row that no linear joint can reach, since their directions do not span space there, stays as it is named.
     """
     rows = np.flatnonzero(named)
@@ -43,6 +53,10 @@ def joints_of_tips(profile: MachineProfile, words: FloatArray, named: BoolArray)
     joints = words.copy()
     gap = world - profile.origin + profile.tip - origin
     joints[rows[:, None], linear] = np.linalg.solve(directions, gap[:, :, None])[:, :, 0]
+    ends = [row for row, _ in told[1:]] + [len(words)]
+    for (row, control), end in zip(told, ends, strict=False):
+        believed = np.flatnonzero(named[row:end]) + row
+        joints[believed] = control.many(words[believed] * profile.to_shown) / profile.to_shown
     return joints
 
 
@@ -75,6 +89,33 @@ def pieces_of_tips(
     cut = off > np.where(fed[rows], MOST_OFF, MOST_OFF_IN_AIR)
     count[rows[cut]] = np.minimum(np.ceil(np.sqrt(off[cut] / FOLLOWED)), MOST_PIECES).astype(np.int64)
     return count
+
+
+def pieces_in_time(
+    profile: MachineProfile,
+    start: FloatArray,
+    joints: FloatArray,
+    filament: FloatArray,
+    named: BoolArray,
+    feed: FloatArray,
+    per_second: FloatArray,
+    least: int,
+) -> IntArray:
+    """(n,) pieces that Marlin's fork cuts turning moves into, where each has less than `least` steps; else 1.
+
+    There are `per_second` (n,) in every second at `feed` (n,) mm/s or degrees/s. Longer pieces are blocks of their own,
+    and make no difference to the row as a whole (`line_to_destination_kinematic`).
+    """
+    before = np.concatenate([start[None], joints[:-1]])
+    change = (joints - before) * profile.to_shown
+    rotary = list(profile.rotary)
+    turned = np.linalg.norm(change[:, rotary], axis=1)
+    straight = np.linalg.norm(world_steps(profile, start, joints), axis=1)
+    length = np.where(straight > SHORTEST, straight, turned)
+    count = np.clip(per_second * length / np.maximum(feed, SHORTEST), 1, LONGEST_ROW).astype(np.int64)
+    steps = np.array([joint.steps_per_unit / joint.shown(1.0) for joint in profile.joints])
+    most = np.abs(np.column_stack([change, filament]) * np.append(steps, profile.extruder.steps_per_mm)).max(axis=1)
+    return np.where(named & (turned > 0) & (most < least * count), count, 1)
 
 
 def cut_words(

@@ -75,3 +75,51 @@ def test_what_the_firmware_would_drop_is_out_of_its_limits(profile: MachineProfi
 
     context = judged(tmp_path, profile, ["G43.4", "G1 X80 Y0 Z60 B90 F3000"])
     assert {finding.code for finding in check(context)} == {"joint-limit"}
+
+
+def machine_after(profile: MachineProfile, program: list[str]) -> SoftwareMachine:
+    machine = SoftwareMachine(profile, speed=None)
+    machine.take()
+    for line in program:
+        machine.receive(line.encode() + b"\n")
+        while b"ok" not in machine.advance(0.0):
+            pass
+    machine.finish()
+    return machine
+
+
+def coarse(profile: MachineProfile) -> MachineProfile:
+    """The machine with 80 steps per mm, and so few per degree that pieces of 5 ms have none to speak of."""
+    joints = tuple(
+        dataclasses.replace(joint, steps_per_unit=joint.shown(1.0) * (200.0 if joint.rotary else 80.0))
+        for joint in profile.joints
+    )
+    return dataclasses.replace(profile, joints=joints)
+
+
+@pytest.mark.parametrize(("feed", "doubled"), [(600, True), (3600, False)])
+def test_slow_turns_run_at_the_multiple_that_short_pieces_make(
+    profile: MachineProfile, tmp_path: Path, feed: int, doubled: bool
+) -> None:
+    """Pieces of 5 ms below six steps are left to the next, which reads F over its own length alone.
+
+    The machine is a little slower, since the first pieces are stretched while the queue fills (SLOWDOWN).
+    """
+    program = ["M302 P1", "M83", "G1 X20 Z10 F3000", "G43.4", "M400", f"G1 X-20 B8 F{feed}", "M400"]
+    context = judged(tmp_path, coarse(profile), program)
+    machine = machine_after(coarse(profile), program)
+    assert 0.0 < machine.now - context.replay.time < 0.08
+    asked = 40.0 / feed * 60
+    rows = context.motion.line == 6
+    took = context.replay.end[rows].max() - context.replay.begin[rows].min()
+    assert took == pytest.approx(asked / 2 if doubled else asked, rel=0.05)
+
+
+def test_m665_in_the_program_makes_judge_and_machine_move_other_joints(profile: MachineProfile, tmp_path: Path) -> None:
+    program = ["M302 P1", "G43.4", "G1 X20 Y10 Z30 B10 F3000", "M665 K-14 S100", "G1 X15 B30 C40", "M400"]
+    context = judged(tmp_path, profile, program)
+    machine = machine_after(profile, program)
+    np.testing.assert_allclose(context.points[-1], machine.trace().points[-1], atol=0.03)
+    plain = judged(tmp_path, profile, [line for line in program if not line.startswith("M665")])
+    assert np.linalg.norm(context.points[-1] - plain.points[-1]) > 0.5
+    assert machine.now == pytest.approx(context.replay.time, rel=0.03)
