@@ -119,7 +119,8 @@ class PrintSettings(BaseModel):
         ge=0,
         le=15,
         description="How far smoothing may turn the tool from the averaged normal so that rotary axes turn evenly, "
-        "degrees; it also rounds the tip's path over facets by up to 0.004 mm. 0 leaves both as they are.",
+        "degrees, and never so that the head would touch the part; it also rounds the tip's path over facets by up to "
+        "0.004 mm. 0 leaves both as they are.",
     )
     chord_tolerance: float = Field(
         0.01,
