@@ -25,6 +25,8 @@ TURNS_BACK = -0.999
 """Cosine at which it stops instead."""
 NEARLY_STRAIGHT = math.sin(1e-3)
 """Cosine of half the angle between moves under which no tolerance bounds the blend."""
+HALVINGS = 30
+"""Of the speeds' distance from the mean, where a trapezoid would be too steep."""
 SAME = 1e-9
 """mm/s within which a ramp has reached the speed from which it can only slow down."""
 
@@ -68,7 +70,7 @@ def overlapping(
     corner = _reachable(leg, push, wanted, corner, joined)
     blend = np.where(meets & ~joined, _blend_speeds(leg, wanted, push, following, cosine, tolerance), 0.0)
     seconds, entry, leave = _laid_over(leg, wanted, push, corner, joined, blend, meets, arc, CYCLE)
-    return _trapezoids(path.length, seconds, entry, leave, push)
+    return _trapezoids(path.length, seconds, entry, leave, push, path.push)
 
 
 def _joints_of_plain_moves(
@@ -251,11 +253,24 @@ def _corner(
 
 
 def _trapezoids(
-    length: FloatArray, seconds: FloatArray, entry: FloatArray, leave: FloatArray, push: FloatArray
+    length: FloatArray, seconds: FloatArray, entry: FloatArray, leave: FloatArray, push: FloatArray, most: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Trapezoids of those lengths and times, between those speeds as far as the mean speed lets them."""
+    """Trapezoids of those lengths and times, between those speeds as far as the mean speed and `most` let them."""
     t = np.maximum(seconds, 1e-9)
     mean = length / t
+    shape = _between(entry, leave, mean, t, length, push)
+    stiff, soft = np.zeros(len(t)), np.where(shape[3] > most, 1.0, 0.0)
+    for _ in range(HALVINGS if soft.any() else 0):
+        part = 0.5 * (stiff + soft)
+        steep = _between(entry + part * (mean - entry), leave + part * (mean - leave), mean, t, length, push)[3] > most
+        stiff, soft = np.where(steep, part, stiff), np.where(steep, soft, part)
+    return _between(entry + soft * (mean - entry), leave + soft * (mean - leave), mean, t, length, push)
+
+
+def _between(
+    entry: FloatArray, leave: FloatArray, mean: FloatArray, t: FloatArray, length: FloatArray, push: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Entry, peak and leaving speed and ramp (m,), whatever the ramp has to be."""
     low, high = np.minimum(entry, leave), np.maximum(entry, leave)
     # Both speeds below the mean: up, along and down, as steep as the move's own ramp if that is steep enough.
     total, squares = entry + leave, entry**2 + leave**2
@@ -263,7 +278,7 @@ def _trapezoids(
     hump = 4.0 * length - 2.0 * total * t
     steep = (hump + np.sqrt(hump**2 + 4.0 * (t * (entry - leave)) ** 2)) / (2.0 * t**2)
     ramp = np.where(room >= 0.0, push, steep)
-    peak = 0.5 * (total + ramp * t - np.sqrt(np.maximum(room, 0.0) * (room >= 0.0)))
+    peak = 0.5 * (total + ramp * t - np.sqrt(np.maximum(room, 0.0)))
     # One of them above: one ramp, and along at the faster one.
     faster = np.minimum(high, 2.0 * mean - low)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -271,5 +286,5 @@ def _trapezoids(
     between = (high > mean) & (low < mean)
     level = low >= mean
     peak = np.where(level, mean, np.where(between, faster, peak))
-    ramp = np.where(level, push, np.where(between, single, ramp))
-    return np.minimum(entry, peak), np.maximum(peak, np.minimum(high, peak)), np.minimum(leave, peak), ramp
+    ramp = np.where(level, push, np.where(between, np.where(single >= 0.0, single, np.inf), ramp))
+    return np.minimum(entry, peak), peak, np.minimum(leave, peak), ramp

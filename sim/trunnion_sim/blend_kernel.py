@@ -40,6 +40,7 @@ CREEP = 1e-8
 BLENDED, JOINED, STOPPED = 0, 1, 2
 """How a move meets the next: both under way for a while, at a common speed, or at rest."""
 LARGEST = 1e12
+HALVINGS = 30
 Law = tuple[_F, _F, _F, _F, _F, _F, _F]
 """Length, asked speed, entry, cruise, exit, acceleration, duration of every row."""
 
@@ -109,6 +110,7 @@ def linuxcnc(
         i = moving[q]
         if meets[i] != JOINED:
             share[i] = min(share[i], 0.5)
+    most = push
     push = push * share
     for q in range(m - 2, -1, -1):
         i, after = moving[q], moving[q + 1]
@@ -116,7 +118,7 @@ def linuxcnc(
             reach = math.sqrt(common[after] ** 2 + 2.0 * push[after] * (length[after] - cut[after]))
             common[i] = min(min(common[i], reach), min(min(wanted[i], top[i]), min(wanted[after], top[after])))
     return _cycles(moving, length, asked, np.minimum(wanted, top), push, meets, common, direction, leader, tolerance,
-                   cycle, length - cut, arc)  # fmt: skip
+                   cycle, length - cut, arc, most)  # fmt: skip
 
 
 @njit(cache=True)
@@ -202,6 +204,7 @@ def _cycles(
     cycle: float,
     leg: _F,
     arc: _F,
+    most: _F,
 ) -> Law:
     """Run the servo cycles (`tpRunCycle`) and read off when every row begins and ends, and how fast."""
     n = len(length)
@@ -272,7 +275,7 @@ def _cycles(
         duration[i] = handed - began
         began = handed
     for i in moving:
-        _fit(i, length, duration, wanted, entry, cruise, leave, acceleration)
+        _fit(i, length, duration, wanted, most, entry, cruise, leave, acceleration)
     return length, asked, entry, cruise, leave, acceleration, duration
 
 
@@ -343,29 +346,58 @@ def _update(
 
 
 @njit(cache=True)
-def _fit(i: int, length: _F, duration: _F, wanted: _F, entry: _F, cruise: _F, leave: _F, acceleration: _F) -> None:
-    """The trapezoid of the row's own length and duration between its two speeds, as near its acceleration as may be."""
+def _fit(
+    i: int,
+    length: _F,
+    duration: _F,
+    wanted: _F,
+    most: _F,
+    entry: _F,
+    cruise: _F,
+    leave: _F,
+    acceleration: _F,
+) -> None:
+    """The trapezoid of the row's own length and duration between its two speeds.
+
+    Where it would be steeper than the axes are (`most`), though both moves together never are, the speeds at its ends
+    give way towards the mean.
+    """
     d, t = length[i], duration[i]
     if t <= 0.0:
         cruise[i] = max(entry[i], leave[i], wanted[i])
         return
     mean = d / t
-    v0, v1, a = entry[i], leave[i], acceleration[i]
+    v0, v1, v, a = _trapezoid(entry[i], leave[i], mean, t, d, acceleration[i])
+    if a > most[i]:
+        stiff, soft = 0.0, 1.0
+        for _ in range(HALVINGS):
+            part = 0.5 * (stiff + soft)
+            first, last = entry[i] + part * (mean - entry[i]), leave[i] + part * (mean - leave[i])
+            if _trapezoid(first, last, mean, t, d, acceleration[i])[3] > most[i]:
+                stiff = part
+            else:
+                soft = part
+        first, last = entry[i] + soft * (mean - entry[i]), leave[i] + soft * (mean - leave[i])
+        v0, v1, v, a = _trapezoid(first, last, mean, t, d, acceleration[i])
+    entry[i], leave[i], cruise[i], acceleration[i] = v0, v1, max(v, v0, v1), a
+
+
+@njit(cache=True)
+def _trapezoid(v0: float, v1: float, mean: float, t: float, d: float, a: float) -> tuple[float, float, float, float]:
+    """Entry, exit, cruise and acceleration, `a` if that is steep enough, of `d` in `t` s between two speeds."""
     low, high = min(v0, v1), max(v0, v1)
     if low >= mean:
-        v0 = v1 = v = mean
-    elif high > mean:
+        return mean, mean, mean, a
+    if high > mean:
         # One ramp and a cruise at the greater of the two, as steep as the length asks for.
         v = min(high, 2.0 * mean - low)
-        a = (v - low) ** 2 / (2.0 * (v * t - d))
-        v0, v1 = min(v0, v), min(v1, v)
-    else:
-        both, squares = v0 + v1, v0 * v0 + v1 * v1
-        room = (both + a * t) ** 2 - 4.0 * a * d - 2.0 * squares
-        if room >= 0.0:
-            v = 0.5 * (both + a * t - math.sqrt(room))
-        else:
-            b = 4.0 * d - 2.0 * both * t
-            a = (b + math.sqrt(max(b * b + 4.0 * t * t * (v0 - v1) ** 2, 0.0))) / (2.0 * t * t)
-            v = 0.5 * (both + a * t)
-    entry[i], leave[i], cruise[i], acceleration[i] = v0, v1, max(v, v0, v1), a
+        room = 2.0 * (v * t - d)
+        steep = (v - low) ** 2 / room if room > 0.0 else LARGEST
+        return min(v0, v), min(v1, v), v, steep
+    both, squares = v0 + v1, v0 * v0 + v1 * v1
+    room = (both + a * t) ** 2 - 4.0 * a * d - 2.0 * squares
+    if room >= 0.0:
+        return v0, v1, 0.5 * (both + a * t - math.sqrt(room)), a
+    b = 4.0 * d - 2.0 * both * t
+    a = (b + math.sqrt(max(b * b + 4.0 * t * t * (v0 - v1) ** 2, 0.0))) / (2.0 * t * t)
+    return v0, v1, 0.5 * (both + a * t), a
