@@ -3,8 +3,8 @@
     python bench/replay.py [--samples freeform,propeller] [--machines NAME,...]
 
 Every program is written in the firmware's dialect, read back and replayed by the simulator under that firmware's own
-rules (F, corners, accelerations, look-ahead); machines that a dialect cannot drive are left out. LinuxCNC's blends,
-which overlap, are put end to end in plan and replay.
+rules (F, corners, accelerations, look-ahead); machines that a dialect cannot drive are left out. LinuxCNC runs cycle by
+cycle on both sides, and a row is what its overlapping moves make of it.
 """
 
 import argparse
