@@ -11,12 +11,15 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
-from trunnion_core.profile import MachineProfile, load_profile, profile_from_file, shipped_profiles
+from trunnion_core.profile import Joint, MachineProfile, load_profile, profile_from_file, shipped_profiles
 from trunnion_core.profile_file import ProfileFile
 from trunnion_core.solid_tables import BoxTable, CylinderTable, HullTable, SolidTable
+from trunnion_sim.chain import joint_matrices
 from trunnion_sim.collision.distance import CONTACT, depth, proven_distance
+from trunnion_sim.collision.pairs import approach, make_pairs
+from trunnion_sim.collision.place import Bodies, Chain
 from trunnion_sim.collision.scene import make_scene
-from trunnion_sim.collision.solids import rows_of, signed_distance
+from trunnion_sim.collision.solids import ball_of, rows_of, signed_distance
 
 
 def still(seed: int, *solids: SolidTable) -> tuple:
@@ -106,6 +109,68 @@ def test_what_is_said_to_be_the_depth_sets_two_boxes_free(seed):
     for way in ways:
         places_less = [places[0] + way * deep * 0.98, places[1]]
         assert measured(rows, turns, places_less, corners)[0] < CONTACT
+
+
+def random_machine(rng: np.random.Generator) -> tuple[list[Joint], Chain, Bodies]:
+    """Three linear and two rotary joints in any order on any side, in any direction, and a box on every link."""
+    kinds = rng.permutation([False, False, False, True, True])
+    joints = []
+    for letter, rotary in zip("XYZAB", kinds.tolist(), strict=True):
+        axis = rng.normal(size=3)
+        values = dict.fromkeys(("speed", "acceleration", "jerk", "corner_speed", "home", "steps_per_unit"), 1.0)
+        side = "work" if rng.random() < 0.5 else "tool"
+        point = rng.uniform(-20, 20, 3) * rotary
+        joints.append(Joint(letter, side, rotary, axis / np.linalg.norm(axis), point, -1.0, 1.0, **values))
+    work = np.array([joint.side == "work" for joint in joints])
+    chain = Chain(
+        work, kinds, np.stack([j.axis for j in joints]), np.stack([j.point for j in joints]), rng.uniform(-5, 5, 3)
+    )
+    carried = [np.zeros(5, bool)] + [(work == work[k]) & (np.arange(5) <= k) for k in range(5)]
+    solids = [BoxTable(shape="box", name="b", min=(0, 0, 0), max=tuple(rng.uniform(1, 9, 3))) for _ in carried]
+    rows, corners, faces = rows_of(solids)
+    balls = [ball_of(row, corners) for row in rows]
+    bodies = Bodies(
+        rows,
+        corners,
+        faces,
+        np.array([ball[0] for ball in balls]),
+        np.array([ball[1] for ball in balls]),
+        Rotation.random(6, random_state=rng.integers(1 << 30)).as_matrix(),
+        rng.uniform(-20, 20, (6, 3)),
+        np.array(carried),
+        np.zeros(6, bool),
+    )
+    return joints, chain, bodies
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 10**6))
+def test_no_row_uses_up_more_of_a_gap_than_is_said(seed: int) -> None:
+    """The bound that everything rests on, on machines of every build: corners of two boxes, placed by 4x4 matrices."""
+    rng = np.random.default_rng(seed)
+    joints, chain, bodies = random_machine(rng)
+    a, b = rng.choice(6, 2, replace=False).tolist()
+    before, after = rng.uniform(-1, 1, (2, 5)) * np.where(chain.rotary, 2.0, 20.0)
+    pairs = make_pairs(np.array([[a, b]]), chain, bodies, np.maximum(np.abs(before), np.abs(after)))
+    n = Rotation.random(random_state=rng.integers(1 << 30)).apply([0.0, 0.0, 1.0])
+    used = approach(before, after, 0, pairs, n, np.empty(2))
+
+    def gap(share: float) -> float:
+        q = before + share * (after - before)
+        reach = []
+        for one, other in ((a, b), (b, a)):
+            matrix = np.eye(4)
+            for j, joint in enumerate(joints):
+                if bodies.carried[one, j] and not bodies.carried[other, j]:
+                    matrix = matrix @ joint_matrices(joint, q[j : j + 1])[0]
+            corners = np.array(np.meshgrid(*zip(bodies.rows[one, 1:4], bodies.rows[one, 4:7], strict=True)))
+            placed = corners.reshape(3, -1).T @ bodies.turns[one].T + bodies.places[one]
+            reach.append((placed @ matrix[:3, :3].T + matrix[:3, 3]) @ n)
+        return float(reach[0].min() - reach[1].max())
+
+    start = gap(0.0)
+    for share in rng.uniform(0, 1, 5):
+        assert gap(share) >= start - share * used - 1e-9
 
 
 def cradle_with(carried_by: str, low: list[float], high: list[float], *tool: dict[str, object]) -> MachineProfile:
