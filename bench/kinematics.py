@@ -1,8 +1,9 @@
-"""Measure the kinematics room: python bench/kinematics.py [--poses 1000000] [--chains 100].
+"""Measure the kinematics room: python bench/kinematics.py [--poses 1000000] [--chains 100] [--prices].
 
 Speeds are beside a plain numpy implementation of the same in the same run: forward as homogeneous 4 x 4 matrices
 multiplied out over all rows at once, inverse as the textbook closed form in whole-array operations. The round trip is
-the full figure of the tests: that many random poses over that many random chains, worst error of any branch.
+the full figure of the tests: that many random poses over that many random chains, worst error of any branch. --prices
+instead plans samples with other prices of a step and prints how much the time of the print changes.
 """
 
 import argparse
@@ -12,21 +13,44 @@ from typing import Any
 
 import numpy as np
 
+from trunnion import samples
+from trunnion.pipeline import settings_for, solid_part
 from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.profile import MachineProfile, load_profile, profile_from_file
 from trunnion_core.profile_file import ProfileFile
+from trunnion_core.settings import PrintSettings
+from trunnion_core.toolpath import Toolpath
+from trunnion_kinematics import branches
 from trunnion_kinematics.branches import choose
 from trunnion_kinematics.chain import JointChain
 from trunnion_kinematics.subdivide import subdivide
+from trunnion_motion.plan import plan_motion
+from trunnion_slicer.slice import slice_mesh
 
 ROUNDS = 7
+SHIPPED = ("generic_ab_cradle", "open5x_prusa_i3", "open5x_voron0", "rep5x_ender3")
+PRICES: dict[str, dict[str, float]] = {
+    "as it is": {},
+    "extruding x 1": {"EXTRUDING_WEIGHT": 1.0},
+    "extruding x 8": {"EXTRUDING_WEIGHT": 8.0},
+    "turning x 0.1": {"TURNING_WEIGHT": 0.1},
+    "turning x 1": {"TURNING_WEIGHT": 1.0},
+    "rewind 0.5 s": {"REWIND_COST": 0.5},
+    "rewind 9 s": {"REWIND_COST": 9.0},
+    "early 0 s": {"EARLY_COST": 0.0},
+    "early 0.1 s": {"EARLY_COST": 0.1},
+}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
     parser.add_argument("--poses", type=int, default=1_000_000)
     parser.add_argument("--chains", type=int, default=100)
+    parser.add_argument("--prices", action="store_true")
     options = parser.parse_args()
+    if options.prices:
+        other_prices()
+        return
     rng = np.random.default_rng(0)
     n = options.poses
     machines = {
@@ -77,25 +101,76 @@ def round_trip(n: int, chains: int, rng: np.random.Generator) -> None:
 
 
 def path_choice(n: int) -> None:
-    for name, machine, rows in (
-        ("A-B cradle", load_profile("generic_ab_cradle"), n),
-        ("endless platter", platter(None), n),
-        ("platter of 3 turns", platter(540), n),
-        ("platter of 66 turns, more needed", platter(12000), n // 10),
-    ):
-        points, tool_axes, travel = winding_path(rows)
+    """CPU seconds of one core, the least of some runs, beside a fixed load of numpy's in the same run."""
+    yardstick = best_cpu(fixed_load, ROUNDS)
+    print(f"choice: the fixed load takes {yardstick:.3f} s of CPU time")
+    points, tool_axes, travel = winding_path(n)
+    speed = np.full(n, 50.0)
+    machines = {name: load_profile(name) for name in SHIPPED}
+    for name, machine in {**machines, "platter of 3 turns": platter(540), "endless platter": platter(None)}.items():
         chain = JointChain.from_profile(machine)
         for tolerance in (0.0, 5.0):
-            began = time.perf_counter()
-            choice = choose(chain, machine, points, tool_axes, travel=travel, axis_tolerance=np.radians(tolerance))
-            took = time.perf_counter() - began
+            options = {"travel": travel, "axis_tolerance": float(np.radians(tolerance)), "speed": speed}
+            choice = choose(chain, machine, points, tool_axes, **options)
+            took = best_cpu(lambda: choose(chain, machine, points, tool_axes, **options), 3)  # noqa: B023
             print(
-                f"choice, {name}, tolerance {tolerance:g} deg: {rows} rows in {took:.2f} s, "
+                f"choice, {name}, tolerance {tolerance:g} deg: {n} rows in {took:.2f} s, {took / yardstick:.1f} loads, "
                 f"{choice.rewinds.size} rewinds, {choice.forced.size} forced"
             )
-        began = time.perf_counter()
         fine = subdivide(chain, points, choice.tool_axes, choice.joints, 0.01, rewinds=choice.rewinds)
-        print(f"subdivision, {name}: {rows} rows to {len(fine.source)} in {time.perf_counter() - began:.2f} s")
+        took = best_cpu(lambda: subdivide(chain, points, choice.tool_axes, choice.joints, 0.01), 1)  # noqa: B023
+        print(f"subdivision, {name}: {n} rows to {len(fine.source)} in {took:.2f} s")
+
+
+def other_prices() -> None:
+    """How far the true time depends on the price of a step: samples on every machine, planned with other prices.
+
+    The price knows speeds, not accelerations. Were another way quicker once accelerations count, some of these prices
+    would find it: seconds of extrusion and of turning weighed anew (turning x 1 takes rotaries for much slower), dearer
+    and cheaper rewinds, turns earlier and later.
+    """
+    for name in ("freeform", "propeller"):
+        settings = PrintSettings(**samples.settings(name))
+        for machine in SHIPPED:
+            profile = load_profile(machine)
+            part = solid_part(name, samples.make(name), profile, settings)
+            toolpath = slice_mesh(part.mesh, settings_for(profile, settings)).toolpath
+            for tolerance in (0.0, 5.0):
+                leaning = settings.model_copy(update={"nonplanar_axis_tolerance": tolerance})
+                seconds = {price: planned_with(price, toolpath, profile, leaning) for price in PRICES}
+                usual = seconds["as it is"]
+                change = ", ".join(f"{price} {took / usual - 1:+.2%}" for price, took in list(seconds.items())[1:])
+                print(f"prices, {name} on {machine}, tolerance {tolerance:g} deg: {usual:.1f} s; {change}", flush=True)
+
+
+def planned_with(price: str, toolpath: Toolpath, profile: MachineProfile, settings: PrintSettings) -> float:
+    """Seconds that the firmware takes for a plan made with other constants in `branches`."""
+    usual = {key: getattr(branches, key) for key in PRICES[price]}
+    try:
+        for key, value in PRICES[price].items():
+            setattr(branches, key, value)
+        return float(plan_motion(toolpath, profile, settings).program.duration.sum())
+    finally:
+        for key, value in usual.items():
+            setattr(branches, key, value)
+
+
+def fixed_load() -> None:
+    """What the choice is compared with: a million numbers sorted, their sines and their sums."""
+    numbers = np.random.default_rng(0).normal(size=1_000_000)
+    np.sort(numbers)
+    np.sin(numbers).sum()
+    np.cumsum(numbers)
+
+
+def best_cpu(call: Callable[[], Any], rounds: int) -> float:
+    """Least CPU time of some runs, in s."""
+    times = []
+    for _ in range(rounds):
+        began = time.process_time()
+        call()
+        times.append(time.process_time() - began)
+    return min(times)
 
 
 def winding_path(n: int) -> tuple[FloatArray, FloatArray, BoolArray]:
