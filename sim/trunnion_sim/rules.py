@@ -24,7 +24,7 @@ class Rules:
     names: frozenset[str] = field(default=frozenset(), kw_only=True)
     """Commands that have a name instead of a number, as far as the judge knows them."""
     corners: Literal["marlin", "per_axis", "klipper", "grbl", "linuxcnc"]
-    """How the speed at a corner comes about: see `replay_kernel` and `toolhead_kernel`."""
+    """How speeds at corners come about: see `replay_kernel`, `duet_kernel`, `toolhead_kernel` and `blend_kernel`."""
     g90_resets_e: bool
     """Whether G90 and G91 also set the mode of the extruder."""
     case_sensitive: bool
