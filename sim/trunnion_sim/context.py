@@ -265,7 +265,10 @@ class Context:
 
     @cached_property
     def stadium_width(self) -> FloatArray:
-        """(n,) mm across a stadium (a rectangle and two half-discs) of the fed volume; 0 where no bead is laid."""
+        """(n,) mm across a stadium (a rectangle and two half-discs) of the fed volume; 0 where no bead is laid.
+
+        Where flow lags behind its drive, that of the planned bead: what a ramp of speed gathers is no wide bead.
+        """
         height = self.bead_height
         area = np.divide(
             self.laid * self.profile.filament_area,
@@ -273,7 +276,11 @@ class Context:
             out=np.zeros(len(self.motion)),
             where=self.feeds & (self.tip_length > 0),
         )
-        return np.where(area > 0, area / height + (1 - math.pi / 4) * height, 0.0)
+        width = np.where(area > 0, area / height + (1 - math.pi / 4) * height, 0.0)
+        if self.pressure is None:
+            return width
+        planned = np.where(np.isfinite(self.rows.width), self.rows.width, np.inf)
+        return np.minimum(width, np.maximum(planned, height))
 
     @cached_property
     def hits(self) -> Hits:

@@ -23,6 +23,8 @@ RATE_SLACK = 0.02
 SMOOTH = 1.0
 """mm: rows shorter than this are judged together with what lies within it, since comments round, rows were merged, and
 beside a pole the tip of a row of hundredths of a millimetre may go half as far again as its ends are apart."""
+LONG = 5.0
+"""mm over which flow that lags behind its drive has to be wrong to be an error: a ramp of speed is shorter."""
 LEAST = 0.05
 """mm of tip travel under which the rounding of E says more than the bead."""
 
@@ -35,9 +37,10 @@ def check(context: Context) -> Iterator[Finding]:
     width, height = context.rows.width, context.rows.height
     named = rows & np.isfinite(width) & np.isfinite(height) & (width > 0) & (height > 0) & context.rows.bead
     planned = np.where(named, bead_area(np.where(named, width, 1.0), np.where(named, height, 1.0)), 1.0)
-    ratio = _ratio(context, named, planned)
+    ratio = _ratio(context, named, planned, SMOOTH)
+    mean = ratio if context.pressure is None else _ratio(context, named, planned, LONG)
     section = section if context.pressure is None else ratio * planned
-    wrong = (ratio > WRONG) | (ratio < 1 / WRONG)
+    wrong = (mean > WRONG) | (mean < 1 / WRONG)
     off = (np.abs(ratio - 1) > OFF) & ~wrong
 
     def message(row: int) -> str:
@@ -61,8 +64,9 @@ def check(context: Context) -> Iterator[Finding]:
     )
 
 
-def _ratio(context: Context, named: BoolArray, planned: FloatArray) -> FloatArray:
-    """(n,) section laid over section planned, of the `named` rows; 1 elsewhere.
+def _ratio(context: Context, named: BoolArray, planned: FloatArray, smooth: float) -> FloatArray:
+    """(n,) section laid over section planned, of the `named` rows; 1 elsewhere. What is shorter than `smooth` mm counts
+    with what lies around it.
 
     Where pressure is known it differs within a row, which counts by its worst part: its ramps or what lies between.
     """
@@ -74,20 +78,21 @@ def _ratio(context: Context, named: BoolArray, planned: FloatArray) -> FloatArra
     meant = np.where(named[:, None], planned[:, None] * way, 0.0).ravel()
     length = np.where(named[:, None], way, 0.0).ravel()
     ends = np.cumsum(length)
-    short = length < SMOOTH
-    laid, meant = np.where(short, _around(laid, ends), laid), np.where(short, _around(meant, ends), meant)
+    short = length < smooth
+    laid = np.where(short, _around(laid, ends, smooth), laid)
+    meant = np.where(short, _around(meant, ends, smooth), meant)
     counts = (length > 0) & (meant > 0)
     ratio = np.divide(laid, meant, out=np.ones(len(laid)), where=counts).reshape(way.shape)
     worst = np.abs(np.log(np.maximum(ratio, 1e-9))).argmax(axis=1)
     return np.asarray(np.take_along_axis(ratio, worst[:, None], axis=1)[:, 0])
 
 
-def _around(values: FloatArray, way: FloatArray) -> FloatArray:
-    """(n,) sum of values over SMOOTH mm of `way` about the middle of each row, of rows at the edge their share."""
+def _around(values: FloatArray, way: FloatArray, smooth: float) -> FloatArray:
+    """(n,) sum of values over `smooth` mm of `way` about the middle of each row, of rows at the edge their share."""
     if not len(values):
         return values
     total = np.append(0.0, np.cumsum(values))
     ends = np.append(0.0, way)
     middle = (ends[:-1] + ends[1:]) / 2
-    upper = np.interp(middle + SMOOTH / 2, ends, total)
-    return np.asarray(upper - np.interp(middle - SMOOTH / 2, ends, total))
+    upper = np.interp(middle + smooth / 2, ends, total)
+    return np.asarray(upper - np.interp(middle - smooth / 2, ends, total))
