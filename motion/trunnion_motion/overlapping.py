@@ -21,6 +21,8 @@ KINK = 0.1
 """Share of the acceleration that LinuxCNC lets a kink between moves of X, Y and Z ask for (ARC_BLEND_KINK_RATIO)."""
 ON_ARC = math.sqrt(0.75)
 """Share of the acceleration that holds such a move on the arc that rounds its corner."""
+NEARLY_HALF = 0.49
+"""Share of a move that such an arc may take at either end."""
 TURNS_BACK = -0.999
 """Cosine at which it stops instead."""
 NEARLY_STRAIGHT = math.sin(1e-3)
@@ -90,7 +92,7 @@ def _joints_of_plain_moves(
     weaker = np.minimum(path.push, path.push[following])
     with np.errstate(divide="ignore", invalid="ignore"):
         lean = np.sqrt(1.0 - half**2) / half
-        room = 0.5 * np.minimum(path.length, path.length[following]) / lean
+        room = NEARLY_HALF * np.minimum(path.length, path.length[following]) / lean
         radius = np.minimum(tolerance * half / (1.0 - half), room)
         around = np.minimum(fastest, np.sqrt(ON_ARC * weaker * radius))
         slowed = fastest * KINK / kink

@@ -164,8 +164,8 @@ def _meet(
         return
     half = math.sqrt(max(0.5 * (1.0 + cosine), 0.0))
     lean = math.sqrt(max(1.0 - half * half, 0.0)) / half
-    # No arc takes more than half of a move.
-    radius = min(tolerance * half / max(1.0 - half, 1e-12), 0.5 * min(length[b], length[i]) / max(lean, 1e-12))
+    # No arc takes half of a move, so that something is left between two.
+    radius = min(tolerance * half / max(1.0 - half, 1e-12), 0.49 * min(length[b], length[i]) / max(lean, 1e-12))
     around = min(fastest, math.sqrt(ARC_NORMAL * min(push[b], push[i]) * radius))
     meets[b], common[b] = JOINED, max(around, fastest * KINK / scale)
     if around >= common[b]:

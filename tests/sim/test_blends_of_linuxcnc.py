@@ -158,3 +158,26 @@ def test_a_creeping_inverse_feed_is_lifted():
     one = np.ones(1, bool)
     asked = linuxcnc(delta, linear, np.array([0.001 / 60]), one, one, SPEED, ACCELERATION, TOLERANCE, CYCLE)[1]
     assert asked[0] == pytest.approx(0.1 / 60)
+
+
+def test_a_zigzag_of_hundredths_leaves_something_between_its_arcs():
+    """Both arcs of a move want more than half of it; what was left was nothing, and 0 / 0."""
+    turns = np.array([[1.0, 0, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0]])
+    path = Path(
+        length=np.full(4, 0.01),
+        wanted=np.full(4, 50.0),
+        push=np.full(4, 1000.0),
+        direction=turns,
+        plain=np.ones(4, bool),
+        stops=np.arange(4) == 0,
+    )
+    entry, peak, leave, ramp = overlapping(path, np.full(3, 1000.0), TOLERANCE)
+    assert np.isfinite([entry, peak, leave, ramp]).all()
+    delta = np.column_stack([0.01 * turns, np.zeros((4, 3))])
+    linear = np.array([True, True, True, False, False, False])
+    judged = linuxcnc(
+        delta, linear, np.full(4, 50.0), np.zeros(4, bool), np.arange(4) == 0, np.full(6, 200.0), np.full(6, 1000.0),
+        TOLERANCE, CYCLE,
+    )  # fmt: skip
+    assert np.isfinite(judged).all()
+    assert judged[6].min() > 0
