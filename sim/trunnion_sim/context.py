@@ -32,6 +32,10 @@ CELLS_ACROSS = 4.0
 """Cells of the height field across a bead where only contacts are looked for, not the surface."""
 STRETCH = 1 << 17
 """Rows of which all that lies between their ends is in memory together."""
+BESIDE = 5.0
+"""mm beside the height field to which motions are still followed."""
+LONG = 50.0
+"""mm: only what is longer is cut where it leaves the field."""
 GAP = 3
 """Rows between two offending rows that still belong to one finding."""
 MOST = 40
@@ -227,7 +231,7 @@ class Context:
         if bounds is None:
             core = beads & (self.rows.role != Role.SKIRT) & ~self.priming
             bounds = self._reach(core if core.any() else beads)
-        motions = (self._laid(stretch, present) for stretch in self.stretches())
+        motions = (_within(self._laid(stretch, present), *bounds) for stretch in self.stretches())
         flat, bore = self.profile.nozzle_flat_diameter, self.profile.nozzle_diameter
         return lay_down(motions, len(self.motion), *bounds, cell, flat, bore)
 
@@ -358,3 +362,32 @@ class Context:
         """Role of a row for messages."""
         role = int(self.rows.role[row])
         return Role(role).text.replace("_", " ") if role >= 0 else "unnamed"
+
+
+def _within(pieces: Pieces, low: FloatArray, high: FloatArray) -> Pieces:
+    """Long pieces cut down to what lies over the rectangle `low` to `high` (mm, X and Y), BESIDE wider.
+
+    A move of a kilometre past the part takes no longer than one of a metre (Liang and Barsky 1984).
+    """
+    step = pieces.end - pieces.start
+    rows = np.flatnonzero(np.linalg.norm(step, axis=1) > LONG)
+    if not rows.size:
+        return pieces
+    begin, end = np.zeros(len(rows)), np.ones(len(rows))
+    for axis in range(2):
+        way, at = step[rows, axis], pieces.start[rows, axis]
+        moves = np.abs(way) > 0
+        sides = [
+            np.divide(side - at, way, out=np.where((side - at) * sign >= 0, inside, 2.0), where=moves)
+            for side, sign, inside in ((low[axis] - BESIDE, -1, 0.0), (high[axis] + BESIDE, 1, 1.0))
+        ]
+        begin = np.maximum(begin, np.where(moves, np.minimum(*sides), sides[0]))
+        end = np.minimum(end, np.where(moves, np.maximum(*sides), np.where(sides[1] > 1, -1.0, sides[1])))
+    start, stop, volume, present = pieces.start.copy(), pieces.end.copy(), pieces.volume.copy(), pieces.present.copy()
+    share = np.clip(end - begin, 0.0, 1.0)
+    inner = share < 1
+    start[rows[inner]] += begin[inner, None] * step[rows[inner]]
+    stop[rows[inner]] = pieces.start[rows[inner]] + end[inner, None] * step[rows[inner]]
+    volume[rows] *= share
+    present[rows] &= share > 0
+    return Pieces(pieces.row, start, stop, pieces.tool_axes, volume, present)

@@ -88,6 +88,39 @@ def test_huge_numbers_move_nothing(tmp_path: Path) -> None:
     assert report.trace.line.tolist() == [1, 3]
 
 
+def test_moves_of_kilometres_are_judged_at_once(tmp_path: Path) -> None:
+    """Followed step by step past the part they would take minutes."""
+    lines = [
+        "G28",
+        "M109 S200",
+        "G1 Z0.2 F600",
+        "G1 X10 E1",
+        "G1 X9999999 Y-9999999 F9999999",
+        "G1 X0 Y0 E9999999",
+        "G1 X20 E9999999.1",
+    ]
+    report = judge(write(tmp_path / "a.gcode", *lines), PLAIN)
+    assert "joint-limit" in report.counts
+    assert np.isfinite(report.trace.points).all()
+
+
+@pytest.mark.parametrize("way", ["X150 Y100", "X150 Y113", "X100 Y150", "X90 Y150"])
+def test_cutting_long_beads_where_they_leave_the_field_changes_nothing_in_it(
+    way: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = ["G28", "M83", "G1 X30 Y100 Z0.2 F6000", f"G1 {way} E4", "G1 Z5", "G1 X30 Y150", "G1 X30 Y20"]
+    context = context_of(write(tmp_path / "a.gcode", *lines), PLAIN)
+    bounds = np.array([-20.0, -12.0]), np.array([-10.0, -2.0])
+    cut = context.lay_down(0.1, bounds)
+    monkeypatch.setattr("trunnion_sim.context.LONG", np.inf)
+    whole = context.lay_down(0.1, bounds)
+    assert cut is not None
+    assert whole is not None
+    # steps of beads fall elsewhere, so that a cell at an edge may be on the other side of it
+    assert np.mean(np.abs(cut.field.top - whole.field.top) > 0.02) < 2e-3
+    assert cut.field.top.sum() == pytest.approx(whole.field.top.sum(), rel=0.01)
+
+
 def test_modal_state(tmp_path: Path) -> None:
     path = write(
         tmp_path / "a.gcode",
