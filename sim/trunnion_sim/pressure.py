@@ -1,9 +1,8 @@
 """What leaves the nozzle, behind what the program and the firmware push: first-order lag of pressure.
 
 Filament in excess of what has come out is under pressure, and flow follows pressure: K dq/dt + q = pushed. K belongs to
-the plastic and its hot end, and only the program can tell it: in its header (`; plastic advance [s] = 0.045`), or else
-by the pressure advance that it sets (M900 K, M572 S, SET_PRESSURE_ADVANCE), which is what its maker thinks K is. A
-program that says neither is taken at its words.
+the plastic and its hot end, and only the program can tell it, in its header (`; plastic advance [s] = 0.045`). What it
+sets the firmware's own advance to is not taken for it: a program that does not tell is taken at its words.
 
 The firmware's own advance adds K times the speed of the filament in the rows where it applies any (`Rules`); programs
 may carry it in their words instead. Either makes up for the lag, both are too much, and none leaves too little where
@@ -18,7 +17,7 @@ import numpy as np
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
 from trunnion_sim import pressure_kernel as kernel
-from trunnion_sim.advance import commanded, own_advance
+from trunnion_sim.advance import own_advance
 from trunnion_sim.motion import Motion
 from trunnion_sim.replay import Replay
 from trunnion_sim.rules import Rules
@@ -58,12 +57,11 @@ def pressure(
     motion: Motion, replay: Replay, profile: MachineProfile, rules: Rules, header: dict[str, str]
 ) -> Pressure | None:
     """The flow of a program whose K is known, or None. Linear in the rows, about ten million a second."""
-    if not len(motion):
+    seconds = _lag(header)
+    if seconds <= 0 or not len(motion):
         return None
+    lag = np.full(len(motion), seconds)
     ahead = own_advance(motion, profile, rules)
-    lag = _lag(motion, header)
-    if lag is None:
-        return None
     per_length = np.divide(motion.filament, replay.length, out=np.zeros(len(motion)), where=replay.length > 0)
     ramp = np.where(replay.acceleration > 0, replay.acceleration, 1.0)
     terms = (
@@ -90,11 +88,10 @@ def phase_shares(replay: Replay) -> FloatArray:
     return np.asarray(np.divide(ways, total, out=np.full(ways.shape, 1 / 3), where=total > 0))
 
 
-def _lag(motion: Motion, header: dict[str, str]) -> FloatArray | None:
-    """(n,) s of K of the plastic, 0 where nothing is said of it; None where nothing ever is."""
+def _lag(header: dict[str, str]) -> float:
+    """s of K of the plastic; 0 where the header does not tell it."""
     try:
         told = float(header.get(PLASTIC, ""))
     except ValueError:
-        told = 0.0
-    lag = np.full(len(motion), told) if 0 < told < np.inf else commanded(motion)
-    return lag if (lag > 0).any() else None
+        return 0.0
+    return told if 0 < told < np.inf else 0.0
