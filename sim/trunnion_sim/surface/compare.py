@@ -15,7 +15,7 @@ from trunnion_core.arrays import FloatArray, IntArray
 from trunnion_core.mesh import Mesh
 from trunnion_sim.report import SurfaceReport
 from trunnion_sim.surface import compare_kernel
-from trunnion_sim.surface.deposit import Field
+from trunnion_sim.surface.deposit import Field, turned
 
 SAMPLES = 125_000
 """Points aimed at."""
@@ -44,7 +44,7 @@ def compare(field: Field, model: Mesh, max_angle_deg: float, layer_height: float
     distance = distance_to_mesh(on_beads, model)
     sign = np.where(on_beads[:, 2] >= z, 1.0, -1.0)
     back = compare_kernel.distance_to_field(
-        field.top, field.x, field.y, field.cell, on_model, np.abs(on_beads[:, 2] - z)
+        field.top, field.x, field.y, field.cell, turned(on_model), np.abs(on_beads[:, 2] - z)
     )
     above = (on_beads[:, 2] - z) * normals[face[hit], 2]
     return SurfaceReport(
@@ -59,7 +59,9 @@ def compare(field: Field, model: Mesh, max_angle_deg: float, layer_height: float
 
 def heights(field: Field, xy: FloatArray) -> FloatArray:
     """(n,) mm: the surface of the beads at (n, 2) points, between four cells; the bed outside the field."""
-    return np.asarray(compare_kernel.field_heights(field.top, field.x, field.y, field.cell, xy), dtype=np.float64)
+    return np.asarray(
+        compare_kernel.field_heights(field.top, field.x, field.y, field.cell, turned(xy)), dtype=np.float64
+    )
 
 
 def model_top(model: Mesh, xy: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -2,48 +2,55 @@ r"""Lay every bead of a program down in order, on what is there, and keep the su
 
 **The bead.** Its section has the area `A` = plastic fed / way of the tip, whatever width the program's comments name.
 Its upper side is the surface that the flat of the nozzle sweeps: the tip's path, level across it at right angles to the
-tool. It reaches down to what lies below (the bed, other beads), at a gap `h` measured under it, and sideways as
-far as the area needs: the section is a stadium of height h and width (A - pi/4 h²) / h + h (the flow model of Slic3r,
-https://manual.slic3r.org/advanced/flow-math), with round edges of radius h/2 that nothing fills up later. Where
-the gap opens sideways, the bead ends where its area is spent.
+tool. It reaches down to what lies below (the bed, other beads), at a gap `h`, and half of it goes to either side until
+its plastic is spent, with a round front of radius h/2. Over open ground that is the stadium of Slic3r's flow model
+(https://manual.slic3r.org/advanced/flow-math). Where a neighbour stands, the front runs over its shoulder and fills the
+groove above and the pore below; at the pitch A / h that is the very moment at which both are full.
 
         ____________            free                 ____________ ____________
        /            \           edges               /    first   V   second   \
       |      A       | h                           |             |             |
-       \____________/                               \____________A____________/    pores below the groove
+       \____________/                               \____________A____________/
+
+**Two heights.** Every cell has the height of the plastic, which later beads lie on and which holds every mm³, and the
+height that is compared with the model. They differ in the groove between two beads: it is compared as open as two round
+beads leave it, though the plastic pressed out of their overlap would fill it, so that the surface is never better than
+that of round beads. (For beads of 0.4 x 0.3 the grooves are 0.012 mm deep on average.)
 
 **Steps.** Plastic leaves through a bore, not through a point: what is fed while the tip moves on by the bore's
 diameter is under the bore all the while and goes where there is room. So the gap, at every place across, is the mean
-over that way. Nothing is carried farther than that.
+over that way.
 
-**No room.** Plastic that finds other plastic in its place first goes into the pores beside and below that the height
-field remembers. Half of what is left widens the bead on its free side, by a quarter of its half width at most; the
-rest rises behind the nozzle and stays as a bulge. (All to the side would hand the same lack on from line to line for
-ever.) The groove between two beads is drawn open even
-where plastic pressed aside would close it, so the surface drawn is never better than that of round beads.
+**No room.** Of the plastic that its side cannot take, half widens the bead on the other, by a quarter of its half width
+at most; the rest rises behind the nozzle, up to one level over what is there. What a corner or the cells' rounding
+leave over or short goes to the next millimetres of the bead, so that nothing vanishes: see `Balance`.
 
 **Too little.** A bead with less area than a round thread of diameter h is a thread: it drops onto what is below, or
 hangs at the nozzle's height if that is farther than half a diameter away. In air the same: it hangs (a bridge).
 
 **Left out.** Sagging, shrinking, swelling and the lag of pressure; round ends of beads (an end is cut square, so that
-volume is kept); what a nozzle not at right angles to its path wipes away; surfaces that face down.
+volume is kept); what a nozzle not at right angles to its path wipes away; surfaces that face down; the ironing of what
+rose by the nozzle when it comes by again.
 """
 
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray, check_array
 from trunnion_sim.surface import deposit_kernel
+from trunnion_sim.surface.draw_kernel import Grid
 
 MOST_CELLS = 24_000_000
 """Cells of the height field; beyond that it is made coarser."""
-NEIGHBOURS = 500
-"""Pieces of the stretch before and after that the bore may reach over."""
+TURN = math.atan(math.sqrt(5) - 2)
+"""rad between X and the rows of the height field: lines along X, Y and the diagonals pass its cells at ever new places
+(the slopes are quadratic irrationals), so that no line lies better in it than another."""
+DEPTH = 5
+"""Row of the kernel's statistics that holds a greatest value and no sum."""
 
 Floats = NDArray[np.float32]
 
@@ -81,10 +88,10 @@ class Pieces:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A height field over X and Y of `part`."""
+    """A height field over X and Y of `part`, its rows turned by TURN from X."""
 
     x: float
-    """mm, centre of cell [0, 0]."""
+    """mm, centre of cell [0, 0], in the field's own directions."""
     y: float
     cell: float
     """mm."""
@@ -92,11 +99,30 @@ class Field:
     """(ny, nx) mm: upper surface of what is printed; 0 is the bed."""
 
 
+@dataclass(frozen=True)
+class Balance:
+    """Where the plastic went, mm³: fed = kept + beyond + not_laid."""
+
+    fed: float
+    kept: float
+    """On the field; every cell counted, less the pores below and inside."""
+    overfill: float
+    """Of what is kept: found no room and stands above the nozzle's height."""
+    beyond: float
+    """Laid beyond the field."""
+    not_laid: float
+    """Fed at rest or on a path steeper than the field can hold, and what the last bead could not take."""
+
+
 @dataclass(frozen=True, eq=False)
 class Deposit:
     """What every row met when it was executed, and what is there in the end. (n,) per row of the program."""
 
     field: Field
+    """With the grooves between beads open."""
+    material: Floats
+    """(ny, nx) mm: the same with the grooves as full as the plastic fills them: what later beads lie on."""
+    balance: Balance
     gap: Floats
     """mm under the bead, where no neighbour reaches in, mean along the row; NaN where no bead was laid in the field."""
     laid: Floats
@@ -132,78 +158,84 @@ def lay_down(
     `ground` gives what stands there before the first bead; by default the bed at 0. Cells grow where the rectangle
     would need more than MOST_CELLS. About 300,000 steps of 2 cells a second.
     """
+    corners = turned(np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]))
+    low, high = corners.min(axis=0), corners.max(axis=0)
     size = np.maximum(high - low, cell)
     cell = max(cell, math.sqrt(float(size[0] * size[1]) / MOST_CELLS))
     nx, ny = (math.ceil(float(extent) / cell) + 1 for extent in size)
-    top = np.zeros((ny, nx), np.float32)
+    material = np.zeros((ny, nx), np.float32)
     if ground is not None:
-        top += ground(low[0] + cell * np.arange(nx)[None, :], low[1] + cell * np.arange(ny)[:, None]).astype(np.float32)
+        at = turned(np.stack(np.meshgrid(low[0] + cell * np.arange(nx), low[1] + cell * np.arange(ny)), axis=-1), -1)
+        material += ground(at[..., 0], at[..., 1])
     before, pores, bulge = (np.zeros((ny, nx), np.float32) for _ in range(3))
-    stamp = np.full((ny, nx), -1e30)
-    memory = np.append(np.zeros(4), np.full(3, np.nan))
+    surface, stamp = material.copy(), np.zeros((ny, nx), np.int32)
+    grid = Grid(float(low[0]), float(low[1]), cell, material, surface, before, pores, bulge, stamp)
+    state, fed = np.zeros(5), 0.0
     kept = np.zeros((7, rows), np.float32)
-    kept[0] = np.nan
     depth_point = np.full((rows, 3), np.nan, np.float32)
-    for stretch, begin, end in _with_neighbours([pieces] if isinstance(pieces, Pieces) else pieces):
-        first, last = int(stretch.row[begin]), int(stretch.row[end - 1]) + 1
-        stats, place = np.zeros((last - first, 7)), np.full((last - first, 3), np.nan)
-        deposit_kernel.run(
-            top,
-            float(low[0]),
-            float(low[1]),
-            cell,
-            stretch.row - first,
-            stretch.start,
-            stretch.end,
-            stretch.tool_axes,
-            stretch.volume,
-            stretch.present,
+    held: Pieces | None = None
+    for stretch, final in _and_whether_last([pieces] if isinstance(pieces, Pieces) else pieces):
+        fed += float(stretch.volume.sum())
+        here = stretch if held is None else joined([held, stretch])
+        if not len(here.row):
+            continue
+        first, last = int(here.row[0]), int(here.row[-1]) + 1
+        stats, place = np.zeros((7, last - first)), depth_point[first:last]
+        stats[DEPTH] = kept[DEPTH, first:last]
+        done = deposit_kernel.run(
+            grid,
+            turned(here.start),
+            turned(here.end),
+            turned(here.tool_axes),
+            here.volume,
+            here.present,
+            here.row - first,
             flat_diameter / 2,
             bore_diameter,
             stats,
             place,
-            begin,
-            end,
-            before,
-            stamp,
-            pores,
-            bulge,
-            memory,
+            final,
+            state,
         )
-        laid = stats[:, 1]
-        stats[:, 0] = np.divide(stats[:, 0], laid, out=np.full(len(laid), np.nan), where=laid > 0)
-        stats[:, 6] = np.divide(stats[:, 6], laid, out=np.zeros(len(laid)), where=laid > 0)
-        kept[:, first:last] = stats.T
-        depth_point[first:last] = place
-    gap, laid_length, unsupported, crowded, bulged, depth, taken = kept
+        stats[DEPTH] -= kept[DEPTH, first:last]
+        kept[:, first:last] += stats
+        held = here.cut(done, len(here.row))
+    gap, laid, unsupported, crowded, bulged, depth, taken = kept
+    np.divide(taken, laid, out=taken, where=laid > 0)
+    np.divide(gap, laid, out=gap, where=laid > 0)
+    gap[laid == 0] = np.nan
     return Deposit(
-        field=Field(float(low[0]), float(low[1]), cell, top),
+        field=Field(grid.x, grid.y, cell, surface),
+        material=material,
+        balance=Balance(fed, float(state[0]), float(bulged.sum()), float(state[1]), float(state[2] + state[3])),
         gap=gap,
-        laid=laid_length,
+        laid=laid,
         unsupported=unsupported,
         crowded=crowded,
         bulged=bulged,
         depth=depth,
-        depth_point=depth_point,
+        depth_point=turned(depth_point.astype(np.float64), -1).astype(np.float32),
         taken=taken,
     )
 
 
-def _with_neighbours(stretches: Iterable[Pieces]) -> Iterator[tuple[Pieces, int, int]]:
-    """Each stretch between the last pieces of the one before and the first of the one after; and where it lies."""
-    before: Pieces | None = None
-    for here, after in pairwise(_then_none(stretch for stretch in stretches if len(stretch.row))):
-        if here is None:
-            break
-        around = [part for part in (before, here, None if after is None else after.cut(0, NEIGHBOURS)) if part]
-        begin = 0 if before is None else len(before.row)
-        yield (joined(around) if len(around) > 1 else here), begin, begin + len(here.row)
-        before = here.cut(max(0, len(here.row) - NEIGHBOURS), len(here.row))
+def turned(points: FloatArray, sign: int = 1) -> FloatArray:
+    """Points or vectors (..., 2 or 3) of `part` in the directions of a field; with sign -1 back."""
+    c, s = math.cos(TURN), sign * math.sin(TURN)
+    result = points.copy()
+    result[..., 0] = c * points[..., 0] + s * points[..., 1]
+    result[..., 1] = c * points[..., 1] - s * points[..., 0]
+    return result
 
 
-def _then_none(stretches: Iterable[Pieces]) -> Iterator[Pieces | None]:
-    yield from stretches
-    yield None
+def _and_whether_last(stretches: Iterable[Pieces]) -> Iterator[tuple[Pieces, bool]]:
+    held: Pieces | None = None
+    for stretch in stretches:
+        if held is not None:
+            yield held, False
+        held = stretch
+    if held is not None:
+        yield held, True
 
 
 def joined(parts: list[Pieces]) -> Pieces:
