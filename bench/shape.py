@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from trunnion_core.arrays import FloatArray
+from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.bead import bead_area, bead_spacing
 from trunnion_core.mesh import Mesh
 from trunnion_sim.report import SurfaceReport
@@ -32,13 +32,13 @@ EXPLANATION = """
 ![Cuts across the lines: round beads and what the judge has](pictures/shape.png)
 
 **Stairs.** Square stairs of layers h cut at their middle are h/4 cos from the ramp on average. Back from the ramp the
-nearest spot is a tread or a riser, h/4 / (1 + slope) on average: together h/4 (cos + 1 / (1 + slope)), 0.150 mm at slope
-0, 0.135 at 0.2 and 0.125 at 0.364 for layers of 0.3. The figure of h/2 cos, 0.145 mm, has points on treads only, none on
-risers. That is why a part with slopes up to 0.75 reads 0.12 mm when it is printed planar. Round edges and the grooves on
-the treads, in the expected column, change these figures by less than 0.003 mm.
+nearest spot is a tread or a riser, h/4 / (1 + slope) on average: together h/4 (cos + 1 / (1 + slope)), 0.150 mm at
+slope 0, 0.136 at 0.2 and 0.126 at 0.364 for layers of 0.3. The figure of h/2 cos, 0.145 mm, has points on treads only,
+none on risers. That is why a part with slopes up to 0.75 reads 0.12 mm when it is printed planar. Round edges and the
+grooves on the treads, which are in the expected column, change these figures by less than 0.006 mm.
 
-**Left out.** Vertical walls: a height field has no points there. On parts sliced for printing the change on half the grid
-can be larger than on these cases, because plastic without room rises in spots that are as small as a bead.
+**Left out.** Vertical walls: a height field has no points there. On sliced parts the change on half the grid can be
+larger than in these cases, because plastic without room rises in spots that are as small as a bead.
 """
 HEAD = "| case | figure | expected | measured | on half the grid | change |\n|---|---|---|---|---|---|"
 
@@ -143,7 +143,7 @@ def noisy(lines: Lines, by: FloatArray) -> Lines:
     return Lines(lines.y, lines.z + by, lines.slope, lines.height, lines.flow)
 
 
-def crests(lines: Lines, chosen: FloatArray) -> FloatArray:
+def crests(lines: Lines, chosen: BoolArray) -> FloatArray:
     """(n, 2) points on the lines' middles."""
     return np.column_stack([np.full(int(chosen.sum()), LONG / 2), lines.y[chosen]])
 
@@ -160,7 +160,7 @@ def expected(lines: list[Lines], slope: float) -> tuple[float, float]:
         rise = np.linspace(z[at], z[at + 1], math.ceil(abs(z[at + 1] - z[at]) / FINE))
         spots.append(np.column_stack([np.full(len(rise), y[at]), rise]))
     back, _ = cKDTree(np.concatenate(spots)).query(np.column_stack([y, base])[inside])
-    return float(there), float(back.mean())
+    return float(there), float(np.mean(back))
 
 
 def outline(lines: list[Lines], y: FloatArray) -> FloatArray:
@@ -212,7 +212,7 @@ def measured(
 
 def ramp(slope: float, base: float) -> Mesh:
     """A block whose top is the plane z = base + slope y."""
-    low = [[0, 0, 0], [LONG, 0, 0], [LONG, DEEP, 0], [0, DEEP, 0]]
+    low: list[list[float]] = [[0, 0, 0], [LONG, 0, 0], [LONG, DEEP, 0], [0, DEEP, 0]]
     high = [[x, y, base + slope * y] for x, y, _ in low]
     faces = [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]]
     for a in range(4):
@@ -229,6 +229,7 @@ def draw(path: Path) -> None:
     figure = Figure(figsize=(10, 6), dpi=80)
     FigureCanvasAgg(figure)
     y = np.arange(3.0, 7.0, 0.002)
+    cases: list[tuple[str, list[Lines], float, bool]]
     cases = [("conformal skin, slope 0.364", [skin(0.364, 0.3)], 0.364, True)]
     cases += [("planar stairs, slope 0.2", stairs(0.2, 0.3), 0.2, False)]
     for axes, (title, lines, slope, ground) in zip(figure.subplots(2, 1), cases, strict=True):
