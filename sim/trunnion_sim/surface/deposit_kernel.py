@@ -115,7 +115,7 @@ def _bead(
     du = min(grid.cell, bore / 8)
     mid = math.ceil((flat + bore / 2) / du)
     ring = 2 * ahead + 2
-    gaps, pores = np.zeros((ring, 2 * mid + 1)), np.zeros((ring, 2 * mid + 1))
+    gaps, pores, bulges = (np.zeros((ring, 2 * mid + 1)), np.zeros((ring, 2 * mid + 1)), np.zeros((ring, 2 * mid + 1)))
     areas, under = np.zeros(ring), np.zeros(ring)
     total = volumes[first : last + 1].sum()
     thread = math.sqrt(4 * total / way / math.pi)
@@ -125,7 +125,7 @@ def _bead(
     reader, read_off, read_volume, fed = first, 0.0, 0.0, 0.0  # the cursor ahead
     reading = 0
     current = -1
-    bead = section(np.ones(3), np.zeros(3), du, 0.1, flat, bore, 1.0)
+    bead = section(np.ones(3), np.zeros(3), np.zeros(3), du, 0.1, flat, bore, 1.0)
     off = 0.0
     previous = Frame(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     started = False
@@ -160,10 +160,12 @@ def _bead(
                     fed = until
                     size, there = _frame(starts[reader], ends[reader], axes[reader])
                     f = middle - read_off
-                    _profile(grid, starts[reader], f, there, du, base + reading - own, gaps[slot], pores[slot])
+                    _profile(
+                        grid, starts[reader], f, there, du, base + reading - own, gaps[slot], pores[slot], bulges[slot]
+                    )
                     under[slot] = gaps[slot, mid]
                     reading += 1
-                gap, pore = np.zeros(2 * mid + 1), np.zeros(2 * mid + 1)
+                gap, pore, soft = np.zeros(2 * mid + 1), np.zeros(2 * mid + 1), np.zeros(2 * mid + 1)
                 area, weights, nearest = 0.0, 0.0, np.inf
                 for k in range(max(0, current - ahead), min(count, current + ahead + 1)):
                     weight = min(1.0, (bore / 2 / pitch - abs(k - current)) + 0.5) if k != current else 1.0
@@ -171,14 +173,16 @@ def _bead(
                         continue
                     gap += weight * gaps[k % ring]
                     pore += weight * pores[k % ring]
+                    soft += weight * bulges[k % ring]
                     area += weight * areas[k % ring]
                     weights += weight
                     nearest = min(nearest, under[k % ring])
                 gap /= weights
                 pore /= weights
+                soft /= weights
                 area = max(area / weights, 1e-6)
                 extra = min(max(state[3] / RELAX, -MOST_RELAXED * area), MOST_RELAXED * area)
-                bead = section(gap, pore, du, area + extra, flat, bore, nearest)
+                bead = section(gap, pore, soft, du, area + extra, flat, bore, nearest)
             stop = length if current == count - 1 else min(length, (current + 1) * pitch - off)
             if stop <= at:
                 stop = min(length, at + 1e-9)
@@ -224,8 +228,10 @@ def _bead(
 
 
 @njit(cache=True)
-def _profile(grid: Grid, p: _F, at: float, frame: Frame, du: float, since: int, gaps: _F, pores: _F) -> None:
-    """Gaps and pores across the path, `at` mm on from p, at right angles to the bead; the bed outside the field."""
+def _profile(
+    grid: Grid, p: _F, at: float, frame: Frame, du: float, since: int, gaps: _F, pores: _F, bulges: _F
+) -> None:
+    """Gaps, pores and bulges across the path, `at` mm on from p, at right angles to the bead; outside, the bed."""
     ny, nx = grid.material.shape
     mid = len(gaps) // 2
     x, y, z = p[0] + at * frame.tx, p[1] + at * frame.ty, p[2] + at * frame.tz
@@ -233,7 +239,7 @@ def _profile(grid: Grid, p: _F, at: float, frame: Frame, du: float, since: int, 
         u = k * du
         fx, fy = (x + u * frame.bx - grid.x) / grid.cell, (y + u * frame.by - grid.y) / grid.cell
         i, j = math.floor(fx), math.floor(fy)
-        height, pore = 0.0, 0.0
+        height, pore, bulge = 0.0, 0.0, 0.0
         if 0 <= i < nx - 1 and 0 <= j < ny - 1:
             fx -= i
             fy -= j
@@ -245,8 +251,10 @@ def _profile(grid: Grid, p: _F, at: float, frame: Frame, du: float, since: int, 
                     else:
                         height += weight * grid.material[j + dj, i + di]
                         pore += weight * grid.pores[j + dj, i + di]
+                        bulge += weight * grid.bulge[j + dj, i + di]
         gaps[mid + k] = (z + u * frame.bz - height) * frame.nz
         pores[mid + k] = pore * frame.nz
+        bulges[mid + k] = bulge * frame.nz
 
 
 @njit(cache=True)

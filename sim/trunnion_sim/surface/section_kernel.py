@@ -69,10 +69,13 @@ class Section(NamedTuple):
 
 
 @njit(cache=True)
-def section(gaps: _F, pores: _F, du: float, area: float, flat: float, bore: float, nearest: float) -> Section:
+def section(
+    gaps: _F, pores: _F, bulges: _F, du: float, area: float, flat: float, bore: float, nearest: float
+) -> Section:
     """The section of `area` mm² over `gaps` (2n + 1) mm, `du` mm apart across the path, the middle one under it.
 
-    `pores` (2n + 1): mm of pore under what is there. `flat` is half the nozzle's flat end, `nearest` the smallest gap
+    `pores` and `bulges` (2n + 1): mm of pore under what is there, and of it that rose behind the nozzle: soft, and for
+    the figures of what is in the way not counted. `flat` is half the nozzle's flat end, `nearest` the smallest gap
     right under the path.
     """
     mid = len(gaps) // 2
@@ -114,15 +117,17 @@ def section(gaps: _F, pores: _F, du: float, area: float, flat: float, bore: floa
         lift = _lift(gaps, du, bulged, filled_right, filled_left, round_right, round_left)
     # what is there, for the checks
     reach = min(mid, round(0.8 * flat / du))
-    low = nearest
+    low, soft = nearest, 0.0
     taken = 0
     contact = False
     for k in range(-mid, mid + 1):
         g = gaps[mid + k]
         if abs(k) <= reach:
             low = min(low, g)
-            taken += g < TAKEN * thread
+            taken += g + bulges[mid + k] < TAKEN * thread
         u = abs(k) * du
+        if u < flat:
+            soft += bulges[mid + k] * du
         front, height = (front_right, h_right) if k < 0 else (front_left, h_left)
         if 0.5 * front < u < front + height / 2 and g < 0.6 * height:
             contact = True
@@ -141,7 +146,7 @@ def section(gaps: _F, pores: _F, du: float, area: float, flat: float, bore: floa
         lift,
         gap,
         1.0 if alone else 0.0,
-        crowded,
+        max(0.0, crowded - soft),
         bulged,
         taken / (2 * reach + 1),
     )
