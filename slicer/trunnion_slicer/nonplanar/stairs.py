@@ -8,9 +8,9 @@ each step and heap plastic in front, and all that is missing would be missing on
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.ndimage import map_coordinates, uniform_filter
+from scipy.ndimage import binary_erosion, map_coordinates, uniform_filter
 
-from trunnion_core.arrays import FloatArray
+from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.bead import bead_spacing, bead_width
 from trunnion_core.layers import Layer
 from trunnion_core.settings import PrintSettings
@@ -30,6 +30,10 @@ SETTLING = 12
 
 ON_FLOOR = 1e-3
 """mm. A place this near to a triangle of the floor, seen from above, is over it."""
+
+ON_BORDER = 0.01
+"""mm. A place this near to where the floor ends is not over it: the beads below end there as well, and what lies beside
+them is no room to fill."""
 
 
 def gap_over_stairs(
@@ -88,9 +92,22 @@ def _step(tops: Tops, floor: Grid, below: float, above: float, width: float) -> 
     centres = tops.centres
     triangle, weights = floor.locate(centres)
     foot = np.einsum("nk,nkd->nd", weights, floor.triangles[triangle])
-    over = (np.linalg.norm(foot[:, :2] - centres, axis=1) < ON_FLOOR).reshape(tops.height.shape)
+    over = _well_over(centres, foot, floor, tops.height.shape)
     step = np.clip(tops.height - foot[:, 2].reshape(over.shape), -below, above)
     cells = max(round(width / tops.cell), 1)
     share = uniform_filter(over.astype(np.float64), cells, mode="constant")
     total = uniform_filter(np.where(over, step, 0.0), cells, mode="constant")
     return np.asarray(np.divide(total, share, out=np.zeros_like(total), where=share > 1e-6))
+
+
+def _well_over(centres: FloatArray, foot: FloatArray, floor: Grid, shape: tuple[int, ...]) -> BoolArray:
+    """`shape`: whether the floor is under places (n, 2) and just beside them; `foot` (n, 3) are its nearest points."""
+    over = (np.linalg.norm(foot[:, :2] - centres, axis=1) < ON_FLOOR).reshape(shape)
+    edge = np.flatnonzero(over & ~binary_erosion(over))
+    for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        beside = centres[edge] + np.array([x, y]) * ON_BORDER
+        triangle, weights = floor.locate(beside)
+        there = np.einsum("nk,nkd->nd", weights, floor.triangles[triangle])
+        off = np.linalg.norm(there[:, :2] - beside, axis=1) >= ON_FLOOR
+        over.ravel()[edge[off]] = False
+    return np.asarray(over)
