@@ -73,7 +73,8 @@ class Dialect:
     shortest: float = 0.0
     """Length of the metric under which the firmware's own arithmetic spoils F; such moves are merged if possible."""
     minimum_steps: int = 0
-    """A move of fewer steps on every joint is measured over the filament instead; merged if possible."""
+    """A move of fewer motor steps on every joint and the filament is joined to the next one (`joining`); one with as
+    many of filament alone is measured over that."""
     minimum_speed: float = 0.0
     """mm/s along the metric; slower moves are sped up by the firmware unless `allow_slower` is said."""
     allow_slower: str | None = None

@@ -1,7 +1,8 @@
 """A machine program becomes the moves that are written: rounded joint words, filament words, seconds.
 
 Rows whose words would not change are merged with the next row; so are rows too short for the firmware to read F right,
-as long as leaving out their end bends the path by no more than MERGE_DEVIATION.
+as long as leaving out their end bends the path by no more than MERGE_DEVIATION. Rows that the firmware would join in
+any case (`joining`) are one move whatever it bends: their words would not be followed.
 """
 
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
 from trunnion_core.roles import Role
 from trunnion_gcode.dialect import Dialect
+from trunnion_gcode.joining import DOUBT, ends_kept, step_places
 from trunnion_gcode.words import carried_ticks, from_ticks, ticks
 
 MERGE_DEVIATION = 0.004
@@ -46,6 +48,8 @@ class Moves:
     """(m,) s that F asks for: those at the speed that the firmware ramps up to."""
     metric: FloatArray
     """(m,) length over which the firmware reads F."""
+    place: FloatArray
+    """(m + 1, k) mm or degrees where the joints stand at the start and after each move."""
     width: FloatArray
     """(m,) mm of the bead; of merged rows the mean over the length of the tip's path."""
     height: FloatArray
@@ -75,6 +79,10 @@ def make_moves(program: MachineProgram, profile: MachineProfile, dialect: Dialec
         if not _merge_once(kept, merged_deviation, program, words, start, profile, dialect):
             break
     moves = _measured(kept, program, words, start, profile, dialect)
+    if dialect.minimum_steps and len(moves.row):
+        run = np.append(0, np.cumsum(~_alike(moves.row, program)))
+        kept[moves.row[~ends_kept(_places(moves, profile), run, dialect.minimum_steps)]] = False
+        moves = _measured(kept, program, words, start, profile, dialect)
     nothing = moves.metric <= 0
     if nothing.any():
         # Out and back, merged, or filament below the last decimal: what it took and fed goes to the next move.
@@ -136,22 +144,14 @@ def _merge_once(
     rows = moves.row
     if len(rows) < 3:
         return False
-    length = moves.metric
-    steps_per_shown = np.array([joint.steps_per_unit for joint in profile.joints]) / profile.to_shown
-    few_steps = (np.abs(moves.step) < dialect.minimum_steps / steps_per_shown).all(axis=1)
     moving = (moves.step != 0).any(axis=1)
-    short = moving & ((length < dialect.shortest) | few_steps)
+    short = moves.metric < dialect.shortest
+    if dialect.minimum_steps:
+        steps = np.abs(np.diff(_places(moves, profile)[:, :-1], axis=0))
+        short |= (steps < dialect.minimum_steps + DOUBT).all(axis=1)
+    short &= moving
     here, there = rows[:-1], rows[1:]
-    event_rows = np.unique([event.row for event in program.events]).astype(np.int64)
-    event_between = np.searchsorted(event_rows, there, "right") > np.searchsorted(event_rows, here, "right")
-    alike = (
-        (program.role[here] == program.role[there])
-        & (program.layer[here] == program.layer[there])
-        & (program.tip_speed[here] == program.tip_speed[there])
-        & moving[:-1]
-        & moving[1:]
-        & ~event_between
-    )
+    alike = _alike(rows, program) & moving[:-1] & moving[1:]
     bend = np.maximum(deviation[here], deviation[there]) + _distance_from_chord(moves.step)
     candidate = (short[:-1] | short[1:]) & alike & (bend <= MERGE_DEVIATION)
     chosen = _no_neighbours(candidate)
@@ -160,6 +160,24 @@ def _merge_once(
     kept[here[chosen]] = False
     deviation[there[chosen]] = bend[chosen]
     return True
+
+
+def _alike(rows: IntArray, program: MachineProgram) -> BoolArray:
+    """(m - 1,) whether moves that end at `rows` (m,) and follow each other do the same thing, nothing in between."""
+    here, there = rows[:-1], rows[1:]
+    event_rows = np.unique([event.row for event in program.events]).astype(np.int64)
+    event_between = np.searchsorted(event_rows, there, "right") > np.searchsorted(event_rows, here, "right")
+    return np.asarray(
+        (program.role[here] == program.role[there])
+        & (program.layer[here] == program.layer[there])
+        & (program.tip_speed[here] == program.tip_speed[there])
+        & ~event_between
+    )
+
+
+def _places(moves: Moves, profile: MachineProfile) -> FloatArray:
+    """(m + 1, k + 1) motor steps of joints and filament at the start and after each move."""
+    return step_places(moves.place, np.append(0.0, np.cumsum(moves.filament)), profile)
 
 
 def _distance_from_chord(step: FloatArray) -> FloatArray:
@@ -194,9 +212,10 @@ def _measured(
     joint_ticks = words[rows]
     scale = 10.0 ** np.array(joint_decimals(profile))
     word_step = np.diff(joint_ticks, axis=0, prepend=start[None]) / scale
-    step = word_step
+    step, place = word_step, np.concatenate([start[None], joint_ticks]) / scale
     if dialect.tip_words:
-        step = np.diff(program.joints[rows], axis=0, prepend=program.start[None]) * profile.to_shown
+        place = np.concatenate([program.start[None], program.joints[rows]]) * profile.to_shown
+        step = np.diff(place, axis=0)
     feeding = np.flatnonzero(~np.isin(program.role[rows], (Role.TRAVEL, Role.LINK)))
     filament_ticks = np.zeros(len(rows), dtype=np.int64)
     fed = np.diff(np.cumsum(program.filament)[rows[feeding]], prepend=0.0)
@@ -204,6 +223,12 @@ def _measured(
     filament = from_ticks(filament_ticks, profile.gcode.decimals_extruder)
     rotary = np.array([joint.rotary for joint in profile.joints])
     asked = program.cruise if program.cruise.size else program.duration
+    metric = dialect.metric(word_step[:, ~rotary], word_step[:, rotary], filament)
+    if dialect.minimum_steps:
+        # Marlin measures what hardly moves the joints over the filament alone.
+        steps = np.abs(np.diff(step_places(place, np.append(0.0, np.cumsum(filament)), profile), axis=0))
+        fed_only = (steps[:, :-1] < dialect.minimum_steps).all(axis=1) & (steps[:, -1] >= dialect.minimum_steps)
+        metric = np.where(fed_only, np.abs(filament), metric)
     return Moves(
         row=rows,
         joint_ticks=joint_ticks,
@@ -213,7 +238,8 @@ def _measured(
         filament=filament,
         seconds=np.diff(np.cumsum(program.duration)[rows], prepend=0.0),
         asked=np.diff(np.cumsum(asked)[rows], prepend=0.0),
-        metric=dialect.metric(word_step[:, ~rotary], word_step[:, rotary], filament),
+        metric=metric,
+        place=place,
         width=_mean_over_merged(program.width, program.tip_length, rows),
         height=_mean_over_merged(program.height, program.tip_length, rows),
     )
