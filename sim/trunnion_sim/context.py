@@ -124,17 +124,13 @@ class Context:
         cut = np.divide(self.replay.length, way, out=np.ones(len(way)), where=self.joined & (way > 0))
         return self.tip_length * np.minimum(cut, 1.0)
 
-    @cached_property
+    @property
     def joined(self) -> BoolArray:
-        """(n,) whether the firmware joins the row to others, because it has too few motor steps or follows such a row.
+        """(n,) whether the firmware joins the row to others, because they have too few motor steps.
 
         What it makes of them is one move in a direction of its own, at most so many steps away from the words.
         """
-        few = np.full(len(self.motion), self.rules.least_steps > 0)
-        for column, joint in enumerate(self.profile.joints):
-            few &= np.abs(np.diff(self.motion.path[:, column])) * joint.steps_per_unit < self.rules.least_steps + 1
-        few[1:] |= few[:-1].copy()
-        return few
+        return self.replay.joined
 
     def surely_moved(self, column: int) -> FloatArray:
         """(n,) mm or rad that a joint moves on each row at least, when the firmware has rounded it to motor steps."""

@@ -30,6 +30,11 @@ class Blocks:
         """Whether there are fewer blocks than rows."""
         return len(self.last) < len(self.of_row)
 
+    @property
+    def shared(self) -> BoolArray:
+        """(n,) rows that are not a block of their own."""
+        return np.append(self.first < self.last, True)[self.of_row]
+
     def sums(self, values: FloatArray) -> FloatArray:
         """(m, ...) sums over the rows of every block."""
         total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])

@@ -50,6 +50,8 @@ class Replay:
     """(n,) s, when the row starts."""
     duration: FloatArray
     """(n,) s."""
+    joined: BoolArray
+    """(n,) whether the firmware makes one move of the row and others, or never makes it, for lack of motor steps."""
 
     @property
     def end(self) -> FloatArray:
@@ -90,8 +92,9 @@ def replay(motion: Motion, profile: MachineProfile, rules: Rules, limits: Limits
     waits = motion.dwell != 0
     stops = homing | waits
     stops[1:] |= homing[:-1]
+    joined = np.zeros(n, np.bool_)
     length, asked, entry, cruise, leave, acceleration, duration = _law(
-        motion, profile, rules, limits, delta, homing, stops
+        motion, profile, rules, limits, delta, homing, stops, joined
     )
     if rules.homes_in_turn:
         times = homing_times(motion, profile, limits, rules.first_move_delay)
@@ -102,7 +105,7 @@ def replay(motion: Motion, profile: MachineProfile, rules: Rules, limits: Limits
     before = np.where(np.isnan(motion.dwell), 0.0, motion.dwell)
     before += _first_moves(length, stops, homing) * rules.first_move_delay
     begin = np.cumsum(before + duration) - duration
-    return Replay(length, asked, entry, cruise, leave, acceleration, begin, duration)
+    return Replay(length, asked, entry, cruise, leave, acceleration, begin, duration, joined)
 
 
 def _first_moves(length: FloatArray, stops: BoolArray, homing: BoolArray) -> BoolArray:
@@ -141,8 +144,12 @@ def _law(
     delta: FloatArray,
     homing: BoolArray,
     stops: BoolArray,
+    joined: BoolArray,
 ) -> toolhead_kernel.Law:
-    """Every row as the firmware's planner drives it; of firmwares without M201 and the like, the first limits hold."""
+    """Every row as the firmware's planner drives it; of firmwares without M201 and the like, the first limits hold.
+
+    Marks in `joined` the rows that share a move.
+    """
     deviation = profile.planner.junction_deviation
     linear = np.array([not joint.rotary for joint in profile.joints])
     first = limits.speed[0], limits.acceleration[0]
@@ -182,7 +189,7 @@ def _law(
             max(rules.least_blocks, profile.planner.blocks),
         )
     else:
-        return _marlin(motion, profile, rules, limits, delta, homing, stops)
+        return _marlin(motion, profile, rules, limits, delta, homing, stops, joined)
     return _homed(law, delta, homing, limits.speed[0])
 
 
@@ -217,6 +224,7 @@ def _marlin(
     delta: FloatArray,
     homing: BoolArray,
     stops: BoolArray,
+    joined: BoolArray,
 ) -> toolhead_kernel.Law:
     deviation = profile.planner.junction_deviation
     steps = _steps_per_unit(profile)
@@ -227,6 +235,7 @@ def _marlin(
     if rules.least_steps:
         counts = np.where(np.isfinite(steps), seen * np.where(np.isfinite(steps), steps, 0.0), delta * MANY_STEPS)
         blocks = blocks_of(counts, homing, rules.least_steps - 0.5)
+        joined[:] = blocks.shared
     last_named = named
     if blocks is not None and blocks.merged:
         rows, counts = [blocks.sums(values) for values in rows], blocks.sums(counts)

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.findings import Finding
 from trunnion_sim.context import Context
 
@@ -17,8 +16,6 @@ FAST = 1.1
 """Ratio of tip speed to wanted speed that is too fast: flow and cooling follow it."""
 FAST_BY = 1.0
 """mm/s on top, for slow moves whose F is rounded."""
-SMOOTH = 1.0
-"""mm: shorter rows are judged together with what lies around them, since plastic follows no change within so little."""
 SLOW = 0.5
 SLOW_SHARE = 0.3
 """Share of the printing time below SLOW that is worth a word: corners alone stay below it."""
@@ -32,8 +29,8 @@ def check(context: Context) -> Iterator[Finding]:
         return
     length = context.driven_length
     per_length = length / np.where(context.replay.length > 0, context.replay.length, 1.0)
-    fastest = np.where(length < SMOOTH, _around(context, length, rows, wanted), per_length * context.replay.cruise)
-    limit = wanted * FAST + FAST_BY
+    fastest = per_length * context.replay.cruise
+    limit = wanted * FAST + FAST_BY  # of every row by itself: words of any length give a written program its speed
     yield from context.find(
         "tip-too-fast",
         "error",
@@ -61,16 +58,3 @@ def check(context: Context) -> Iterator[Finding]:
             point=context.point(worst),
             count=int(slow.sum()),
         )
-
-
-def _around(context: Context, length: FloatArray, rows: BoolArray, wanted: FloatArray) -> FloatArray:
-    """(n,) mm/s: mean speed over SMOOTH mm of beads about the middle of each row, as if all of it were wanted alike."""
-    way = np.append(0.0, np.cumsum(np.where(rows, length, 0.0)))
-    asked = np.append(0.0, np.cumsum(np.where(rows, length / np.where(rows, wanted, 1.0), 0.0)))
-    taken = np.append(0.0, np.cumsum(np.where(rows, context.replay.duration, 0.0)))
-    middle = (way[:-1] + way[1:]) / 2
-    begin, end = middle - SMOOTH / 2, middle + SMOOTH / 2
-    should = np.interp(end, way, asked) - np.interp(begin, way, asked)
-    did = np.interp(end, way, taken) - np.interp(begin, way, taken)
-    speed: FloatArray = np.divide(should * wanted, did, out=np.zeros(len(wanted)), where=rows & (did > 0))
-    return speed
