@@ -25,11 +25,14 @@ from trunnion_sim.reader import FileEnd
 from trunnion_sim.replay import Replay, pieces, samples
 from trunnion_sim.rules import Rules
 from trunnion_sim.surface.deposit import Deposit, Pieces, lay_down
+from trunnion_sim.surface.places import shared
 
 TURN_STEP = math.radians(1.0)
 """rad that a rotary turns between two looks inside a row: 0.006 mm of arc height at 150 mm from the pivot."""
 CELLS_ACROSS = 4.0
 """Cells of the height field across a bead where only contacts are looked for, not the surface."""
+PLACES_ACROSS = 6.0
+"""Cells across a bead where places are looked for that two beads share."""
 STRETCH = 1 << 17
 """Rows of which all that lies between their ends is in memory together."""
 BESIDE = 5.0
@@ -220,16 +223,38 @@ class Context:
 
         Without bounds the field covers every bead but the skirt and priming. None where the program lays nothing.
         """
-        present = ~self.homing & (self.homed | ~self.homing.any())
-        beads = self.feeds & present
+        bounds = bounds or self._bounds
+        if bounds is None:
+            return None
+        flat, bore = self.profile.nozzle_flat_diameter, self.profile.nozzle_diameter
+        return lay_down(self._motions(bounds), len(self.motion), *bounds, cell, flat, bore)
+
+    def shared_places(self) -> FloatArray:
+        """(n,) share of the place that each row's bead was meant for that another bead's was before."""
+        bounds = self._bounds
+        if bounds is None:
+            return np.zeros(len(self.motion))
+        pitch = np.maximum(self.stadium_width - (1 - math.pi / 4) * self.bead_height, 0.0)
+        cell = self.bead_width / PLACES_ACROSS
+        return shared(self._motions(bounds), pitch, self.bead_height, *bounds, cell)
+
+    @cached_property
+    def _present(self) -> BoolArray:
+        """(n,) whether the tip is where the program thinks it is."""
+        return np.asarray(~self.homing & (self.homed | ~self.homing.any()))
+
+    @cached_property
+    def _bounds(self) -> tuple[FloatArray, FloatArray] | None:
+        """Low and high corner (2,) mm in X and Y of every bead but the skirt and priming; None where none is laid."""
+        beads = self.feeds & self._present
         if not beads.any():
             return None
-        if bounds is None:
-            core = beads & (self.rows.role != Role.SKIRT) & ~self.priming
-            bounds = self._reach(core if core.any() else beads)
-        motions = (_within(self._laid(stretch, present), *bounds) for stretch in self.stretches())
-        flat, bore = self.profile.nozzle_flat_diameter, self.profile.nozzle_diameter
-        return lay_down(motions, len(self.motion), *bounds, cell, flat, bore)
+        core = beads & (self.rows.role != Role.SKIRT) & ~self.priming
+        return self._reach(core if core.any() else beads)
+
+    def _motions(self, bounds: tuple[FloatArray, FloatArray]) -> Iterator[Pieces]:
+        """What every stretch lays down over the bounds, and its travels."""
+        return (_within(self._laid(stretch, self._present), *bounds) for stretch in self.stretches())
 
     def _laid(self, stretch: Stretch, present: BoolArray) -> Pieces:
         """What a stretch lays down: the plastic of each row, shared among its pieces by their length."""

@@ -32,8 +32,8 @@ BRIDGE = 20.0
 LONGEST_DOUBLE = 10.0
 """mm: seams, corners and the joints of infill along a wall overlap for shorter stretches in every slicer's programs."""
 OVER, CROWDED = 0.6, 0.5
-"""Share of a bead's plastic that finds no room, or of its place that is taken; of thin beads, which slicers lay on
-purpose where there is little room, the less the thinner they are."""
+"""Share of a bead's place that another bead was laid in before; of thin beads, which slicers lay on purpose where there
+is little room, the less the thinner they are."""
 DIP = 0.4
 """Of a layer height: how far a travel may dip into the round top of a bead that stands a little proud."""
 
@@ -78,12 +78,11 @@ def check(context: Context) -> Iterator[Finding]:
         limit=BRIDGE,
     )
     volume = context.laid * context.profile.filament_area
-    share = np.divide(deposit.crowded, volume, out=np.zeros(len(volume)), where=context.feeds & (deposit.laid > 0))
-    share = np.where(meant, np.maximum(share, deposit.taken), 0.0) * _thickness(context, volume)
+    share = np.where(meant, context.shared_places(), 0.0) * _thickness(context, volume)
     double = _run_length(share > OVER, deposit.laid) > LONGEST_DOUBLE
 
     def message(row: int) -> str:
-        return f"{min(share[row], 1):.0%} of the bead finds its place taken"
+        return f"{min(share[row], 1):.0%} of the bead's place is taken by another bead"
 
     yield from context.find("bead-over-bead", "error", double, message, value=share, limit=OVER)
     crowded = (_run_length(share > CROWDED, deposit.laid) > SHORTEST) & ~double

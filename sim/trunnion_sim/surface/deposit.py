@@ -49,7 +49,7 @@ MOST_CELLS = 24_000_000
 TURN = math.atan(math.sqrt(5) - 2)
 """rad between X and the rows of the height field: lines along X, Y and the diagonals pass its cells at ever new places
 (the slopes are quadratic irrationals), so that no line lies better in it than another."""
-DEPTH = 5
+DEPTH = 4
 """Row of the kernel's statistics that holds a greatest value and no sum."""
 
 Floats = NDArray[np.float32]
@@ -129,16 +129,12 @@ class Deposit:
     """mm of bead laid inside the field."""
     unsupported: Floats
     """mm of it with nothing below within reach and no neighbour beside."""
-    crowded: Floats
-    """mm³ that found other plastic in its place and had to go elsewhere."""
     bulged: Floats
-    """mm³ of that which found no room at all and stands above the nozzle's height."""
+    """mm³ that found no room and stand above the nozzle's height."""
     depth: Floats
     """mm that the tip dips below the surface of what is printed, at worst, on a travel."""
     depth_point: Floats
     """(n, 3) mm: where."""
-    taken: Floats
-    """Share of the bead's place, across and along, that other plastic holds up to the nozzle."""
 
 
 def lay_down(
@@ -171,7 +167,7 @@ def lay_down(
     surface, stamp = material.copy(), np.zeros((ny, nx), np.int32)
     grid = Grid(float(low[0]), float(low[1]), cell, material, surface, before, pores, bulge, stamp)
     state, fed = np.zeros(5), 0.0
-    kept = np.zeros((7, rows), np.float32)
+    kept = np.zeros((5, rows), np.float32)
     depth_point = np.full((rows, 3), np.nan, np.float32)
     held: Pieces | None = None
     for stretch, final in _and_whether_last([pieces] if isinstance(pieces, Pieces) else pieces):
@@ -180,7 +176,7 @@ def lay_down(
         if not len(here.row):
             continue
         first, last = int(here.row[0]), int(here.row[-1]) + 1
-        stats, place = np.zeros((7, last - first)), depth_point[first:last]
+        stats, place = np.zeros((5, last - first)), depth_point[first:last]
         stats[DEPTH] = kept[DEPTH, first:last]
         done = deposit_kernel.run(
             grid,
@@ -200,8 +196,7 @@ def lay_down(
         stats[DEPTH] -= kept[DEPTH, first:last]
         kept[:, first:last] += stats
         held = here.cut(done, len(here.row))
-    gap, laid, unsupported, crowded, bulged, depth, taken = kept
-    np.divide(taken, laid, out=taken, where=laid > 0)
+    gap, laid, unsupported, bulged, depth = kept
     np.divide(gap, laid, out=gap, where=laid > 0)
     gap[laid == 0] = np.nan
     return Deposit(
@@ -211,11 +206,9 @@ def lay_down(
         gap=gap,
         laid=laid,
         unsupported=unsupported,
-        crowded=crowded,
         bulged=bulged,
         depth=depth,
         depth_point=turned(depth_point.astype(np.float64), -1).astype(np.float32),
-        taken=taken,
     )
 
 

@@ -51,9 +51,9 @@ def run(
 ) -> int:
     """Execute pieces; returns how many: unless they are the `final` ones, a bead that may go on is left for later.
 
-    Fills the grid, depth_point, and of stats (7, n) gap x length, length, unsupported, crowded, bulged, depth,
-    taken x length. `state` (5,) is handed on from call to call: mm³ kept on the grid, laid beyond it, not laid, owed to
-    the next step; number of the last step.
+    Fills the grid, depth_point, and of stats (5, n) gap x length, length, unsupported, bulged, depth. `state` (5,) is
+    handed on from call to call: mm³ kept on the grid, laid beyond it, not laid, owed to the next step; number of the
+    last step.
     """
     ny, nx = grid.material.shape
     low_x, high_x = grid.x - MARGIN, grid.x + (nx - 1) * grid.cell + MARGIN
@@ -72,7 +72,7 @@ def run(
             _travel(grid, p, q, rows[m], stats, depth_point)
             m += 1
             continue
-        length, frame = _frame(p, q, axes[m])
+        length, frame = frame_of(p, q, axes[m])
         if length < 1e-9 or frame.nz < STEEPEST:
             state[2] += volumes[m]
             m += 1
@@ -80,7 +80,7 @@ def run(
         last = m
         way = length
         while last + 1 < len(rows) and last - m < MOST_PIECES and _goes_on(starts, ends, volumes, present, last):
-            length, frame = _frame(starts[last + 1], ends[last + 1], axes[last + 1])
+            length, frame = frame_of(starts[last + 1], ends[last + 1], axes[last + 1])
             if length >= 1e-9 and frame.nz < STEEPEST:
                 break
             last += 1
@@ -115,7 +115,7 @@ def _bead(
     du = min(grid.cell, bore / 8)
     mid = math.ceil((flat + bore / 2) / du)
     ring = 2 * ahead + 2
-    gaps, pores, bulges = (np.zeros((ring, 2 * mid + 1)), np.zeros((ring, 2 * mid + 1)), np.zeros((ring, 2 * mid + 1)))
+    gaps, pores = np.zeros((ring, 2 * mid + 1)), np.zeros((ring, 2 * mid + 1))
     areas, under = np.zeros(ring), np.zeros(ring)
     total = volumes[first : last + 1].sum()
     thread = math.sqrt(4 * total / way / math.pi)
@@ -125,12 +125,12 @@ def _bead(
     reader, read_off, read_volume, fed = first, 0.0, 0.0, 0.0  # the cursor ahead
     reading = 0
     current = -1
-    bead = section(np.ones(3), np.zeros(3), np.zeros(3), du, 0.1, flat, bore, 1.0)
+    bead = section(np.ones(3), np.zeros(3), du, 0.1, flat, bore, 1.0)
     off = 0.0
     previous = Frame(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     started = False
     for m in range(first, last + 1):
-        length, frame = _frame(starts[m], ends[m], axes[m])
+        length, frame = frame_of(starts[m], ends[m], axes[m])
         if length < 1e-9:
             state[3] += volumes[m]
             continue
@@ -138,7 +138,7 @@ def _bead(
         mitre_start, sharp = _mitre(previous, frame) if started else (0.0, False)
         mitre_end = 0.0
         for k in range(m + 1, last + 1):
-            size, following = _frame(starts[k], ends[k], axes[k])
+            size, following = frame_of(starts[k], ends[k], axes[k])
             if size >= 1e-9:
                 mitre_end, _ = _mitre(frame, following)
                 break
@@ -158,14 +158,12 @@ def _bead(
                     until = _volume_at(starts, ends, volumes, reader, last, read_off, read_volume, end)
                     areas[slot] = (until - fed) / pitch
                     fed = until
-                    size, there = _frame(starts[reader], ends[reader], axes[reader])
+                    size, there = frame_of(starts[reader], ends[reader], axes[reader])
                     f = middle - read_off
-                    _profile(
-                        grid, starts[reader], f, there, du, base + reading - own, gaps[slot], pores[slot], bulges[slot]
-                    )
+                    _profile(grid, starts[reader], f, there, du, base + reading - own, gaps[slot], pores[slot])
                     under[slot] = gaps[slot, mid]
                     reading += 1
-                gap, pore, soft = np.zeros(2 * mid + 1), np.zeros(2 * mid + 1), np.zeros(2 * mid + 1)
+                gap, pore = np.zeros(2 * mid + 1), np.zeros(2 * mid + 1)
                 area, weights, nearest = 0.0, 0.0, np.inf
                 for k in range(max(0, current - ahead), min(count, current + ahead + 1)):
                     weight = min(1.0, (bore / 2 / pitch - abs(k - current)) + 0.5) if k != current else 1.0
@@ -173,16 +171,14 @@ def _bead(
                         continue
                     gap += weight * gaps[k % ring]
                     pore += weight * pores[k % ring]
-                    soft += weight * bulges[k % ring]
                     area += weight * areas[k % ring]
                     weights += weight
                     nearest = min(nearest, under[k % ring])
                 gap /= weights
                 pore /= weights
-                soft /= weights
                 area = max(area / weights, 1e-6)
                 extra = min(max(state[3] / RELAX, -MOST_RELAXED * area), MOST_RELAXED * area)
-                bead = section(gap, pore, soft, du, area + extra, flat, bore, nearest)
+                bead = section(gap, pore, du, area + extra, flat, bore, nearest)
             stop = length if current == count - 1 else min(length, (current + 1) * pitch - off)
             if stop <= at:
                 stop = min(length, at + 1e-9)
@@ -218,9 +214,7 @@ def _bead(
             stats[0, row] += bead.gap * size
             stats[1, row] += size
             stats[2, row] += bead.unsupported * size
-            stats[3, row] += bead.crowded * size
-            stats[4, row] += bead.bulged * size
-            stats[6, row] += bead.taken * size
+            stats[3, row] += bead.bulged * size
             at = stop
         off += length
         previous = frame
@@ -228,10 +222,8 @@ def _bead(
 
 
 @njit(cache=True)
-def _profile(
-    grid: Grid, p: _F, at: float, frame: Frame, du: float, since: int, gaps: _F, pores: _F, bulges: _F
-) -> None:
-    """Gaps, pores and bulges across the path, `at` mm on from p, at right angles to the bead; outside, the bed."""
+def _profile(grid: Grid, p: _F, at: float, frame: Frame, du: float, since: int, gaps: _F, pores: _F) -> None:
+    """Gaps and pores across the path, `at` mm on from p, at right angles to the bead; outside, the bed."""
     ny, nx = grid.material.shape
     mid = len(gaps) // 2
     x, y, z = p[0] + at * frame.tx, p[1] + at * frame.ty, p[2] + at * frame.tz
@@ -239,7 +231,7 @@ def _profile(
         u = k * du
         fx, fy = (x + u * frame.bx - grid.x) / grid.cell, (y + u * frame.by - grid.y) / grid.cell
         i, j = math.floor(fx), math.floor(fy)
-        height, pore, bulge = 0.0, 0.0, 0.0
+        height, pore = 0.0, 0.0
         if 0 <= i < nx - 1 and 0 <= j < ny - 1:
             fx -= i
             fy -= j
@@ -251,10 +243,8 @@ def _profile(
                     else:
                         height += weight * grid.material[j + dj, i + di]
                         pore += weight * grid.pores[j + dj, i + di]
-                        bulge += weight * grid.bulge[j + dj, i + di]
         gaps[mid + k] = (z + u * frame.bz - height) * frame.nz
         pores[mid + k] = pore * frame.nz
-        bulges[mid + k] = bulge * frame.nz
 
 
 @njit(cache=True)
@@ -274,15 +264,15 @@ def _travel(grid: Grid, p: _F, q: _F, row: int, stats: _F, depth_point: _G) -> N
         i, j = round((x - grid.x) / grid.cell), round((y - grid.y) / grid.cell)
         if 0 <= i < nx and 0 <= j < ny:
             depth = grid.material[j, i] - grid.bulge[j, i] - z
-            if grid.material[j, i] > 0 and depth > stats[5, row]:
-                stats[5, row] = depth
+            if grid.material[j, i] > 0 and depth > stats[4, row]:
+                stats[4, row] = depth
                 depth_point[row, 0] = x
                 depth_point[row, 1] = y
                 depth_point[row, 2] = z
 
 
 @njit(cache=True)
-def _frame(p: _F, q: _F, a: _F) -> tuple[float, Frame]:
+def frame_of(p: _F, q: _F, a: _F) -> tuple[float, Frame]:
     """Length of a piece and its frame; nz is 0 where the tool lies along the path."""
     tx, ty, tz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     length = math.sqrt(tx * tx + ty * ty + tz * tz)

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 _F = NDArray[np.float64]
 
-TAKEN = 0.35
-"""In thread diameters: a gap so small that the place counts as taken."""
 REACH = 1.5
 """In thread diameters: gap up to which a thread falls onto what is below."""
 LEAST = 0.1
@@ -60,22 +58,15 @@ class Section(NamedTuple):
     """mm under the path."""
     unsupported: float
     """1 where nothing is below within reach and no neighbour beside."""
-    crowded: float
-    """mm² that found other plastic in its place."""
     bulged: float
-    """mm² of it that found no room at all and rose."""
-    taken: float
-    """Share of the way across the nozzle's flat end that is taken."""
+    """mm² that found no room and rose."""
 
 
 @njit(cache=True)
-def section(
-    gaps: _F, pores: _F, bulges: _F, du: float, area: float, flat: float, bore: float, nearest: float
-) -> Section:
+def section(gaps: _F, pores: _F, du: float, area: float, flat: float, bore: float, nearest: float) -> Section:
     """The section of `area` mm² over `gaps` (2n + 1) mm, `du` mm apart across the path, the middle one under it.
 
-    `pores` and `bulges` (2n + 1): mm of pore under what is there, and of it that rose behind the nozzle: soft, and for
-    the figures of what is in the way not counted. `flat` is half the nozzle's flat end, `nearest` the smallest gap
+    `pores` (2n + 1): mm of pore under what is there. `flat` is half the nozzle's flat end, `nearest` the smallest gap
     right under the path.
     """
     mid = len(gaps) // 2
@@ -95,7 +86,6 @@ def section(
     sum_right, sum_left = np.cumsum(room_right + pore_right) * du, np.cumsum(room_left + pore_left) * du
     lack_right = max(0.0, area / 2 - _spread(end_right, room_right, pore_right, sum_right, du, h_right))
     lack_left = max(0.0, area / 2 - _spread(end_left, room_left, pore_left, sum_left, du, h_left))
-    crowded = lack_right + lack_left
     front_right, got_right = _front(area / 2, end_right, room_right, pore_right, sum_right, du, h_right)
     front_left, got_left = _front(area / 2, end_left, room_left, pore_left, sum_left, du, h_left)
     to_right = to_left = area / 2
@@ -117,17 +107,13 @@ def section(
         lift = _lift(gaps, du, bulged, filled_right, filled_left, round_right, round_left)
     # what is there, for the checks
     reach = min(mid, round(0.8 * flat / du))
-    low, soft = nearest, 0.0
-    taken = 0
+    low = nearest
     contact = False
     for k in range(-mid, mid + 1):
         g = gaps[mid + k]
         if abs(k) <= reach:
             low = min(low, g)
-            taken += g + bulges[mid + k] < TAKEN * thread
         u = abs(k) * du
-        if u < flat:
-            soft += bulges[mid + k] * du
         front, height = (front_right, h_right) if k < 0 else (front_left, h_left)
         if 0.5 * front < u < front + height / 2 and g < 0.6 * height:
             contact = True
@@ -146,9 +132,7 @@ def section(
         lift,
         gap,
         1.0 if alone else 0.0,
-        max(0.0, crowded - soft),
         bulged,
-        taken / (2 * reach + 1),
     )
 
 
