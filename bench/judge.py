@@ -9,23 +9,35 @@ Each is judged by `trunnion check` in a process of its own, start-up included; t
 
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 
-from trunnion_core.bead import bead_area
+from trunnion_core.bead import bead_area, bead_spacing
 from trunnion_core.profile import MachineProfile, load_profile
-from trunnion_kinematics.branches import choose
-from trunnion_kinematics.chain import JointChain
+from trunnion_core.roles import Role
+from trunnion_core.settings import PrintSettings
+from trunnion_core.toolpath import Toolpath
+from trunnion_gcode.write import write_program
+from trunnion_motion.plan import plan_motion
 
-WIDTH, HEIGHT, PITCH, SEGMENT, SIZE = 0.4, 0.3, 0.36, 0.72, 60.0
+WIDTH, HEIGHT, SEGMENT, SIZE = 0.4, 0.3, 0.72, 60.0
 """mm."""
-SPEED = 40.0
+PITCH = bead_spacing(WIDTH, HEIGHT)
+GROWTH, SCALE = 0.1, 9.0
+"""mm by which the waves of a layer are higher than those of the one below, and of their length over two pi."""
+CLEAR = 6.0
+"""mm above a layer, for travels."""
+MIDDLE = 110.0
+"""mm: where the middle of the 3-axis machine's bed is, in its own words."""
+SPEED, TRAVEL = 40.0, 100.0
 """mm/s."""
 
 
@@ -40,13 +52,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         cradle, plain = load_profile("generic_ab_cradle"), load_profile("generic_3axis")
         path = Path(folder) / "program.gcode"
-        write(path, layers(cradle, chosen.segments, wave=1.5))
+        planned(path, cradle, chosen.segments)
         row("five axes", path, "generic_ab_cradle", chosen.segments)
-        write(path, layers(plain, chosen.segments, wave=0.0))
+        write(path, layers("generic_3axis", plain.filament_area, chosen.segments))
         row("three axes", path, "generic_3axis", chosen.segments)
         if not chosen.bad:
             return
-        write(path, layers(plain, 5_000_000, wave=0.0))
+        write(path, layers("generic_3axis", plain.filament_area, 5_000_000))
         row("5 M lines", path, "generic_3axis", 5_000_000)
         with path.open("wb") as file:
             for _ in range(2048):
@@ -80,42 +92,74 @@ def write(path: Path, lines: Iterator[str]) -> None:
         file.writelines(f"{line}\n" for line in lines)
 
 
-def layers(profile: MachineProfile, segments: int, wave: float) -> Iterator[str]:
-    """A program of crossed zigzags, wavy by `wave` mm with the tool on the normal, until there are enough segments."""
-    chain = JointChain.from_profile(profile)
-    per_mm = float(bead_area(np.array(WIDTH), np.array(HEIGHT))) / profile.filament_area
-    yield from (f"; machine = {Path(profile.file).stem}", "G21", "G90", "M83", "G28", "M104 S210", "M109 S210")
-    layer = 0
-    while segments > 0:
-        points, axes = _zigzag(layer, wave)
-        points, axes = points[: segments + 1], axes[: segments + 1]
-        path = choose(chain, profile, points, axes, travel=np.zeros(len(points), dtype=np.bool_))
-        joints = path.joints * profile.to_shown
-        plastic = np.linalg.norm(np.diff(points, axis=0), axis=1) * per_mm
+def planned(path: Path, profile: MachineProfile, segments: int) -> None:
+    """Write a program of crossed zigzags whose layers grow wavy, the tool on the normal, timed for the machine."""
+    layers = math.ceil(segments / len(_zigzag(0)))
+    parts = []
+    for k in range(layers):
+        xy = _zigzag(k)
+        x, y = xy.T
+        wave = np.cos(x / SCALE) * np.cos(y / SCALE)
+        slope_x, slope_y = (-k * GROWTH / SCALE * np.sin(a / SCALE) * np.cos(b / SCALE) for a, b in ((x, y), (y, x)))
+        normal = np.stack([-slope_x, -slope_y, np.ones(len(x))], axis=1)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        points = np.column_stack([xy, (k + 1) * HEIGHT + k * GROWTH * wave])
+        height = np.where(k > 0, HEIGHT + GROWTH * wave, HEIGHT) * normal[:, 2]
+        above = points[:, 2].max() + CLEAR
+        way = np.array([[*xy[0], above], points[0]])
+        leave = np.array([[*xy[-1], above]])
+        up = np.array([[0.0, 0.0, 1.0]])
+        bead = np.repeat([False, True, False], [2, len(xy) - 1, 1])
+        parts.append(
+            (
+                np.concatenate([way, points[1:], leave]),
+                np.concatenate([normal[:1], normal, normal[-1:]]) if k else np.repeat(up, len(xy) + 2, axis=0),
+                bead,
+                np.where(bead, np.concatenate([[0.0], height, [0.0]]), 0.0),
+                np.full(len(bead), k),
+            )
+        )
+    points, axes, bead, height, layer = (np.concatenate(column) for column in zip(*parts, strict=True))
+    toolpath = Toolpath(
+        points=points,
+        tool_axes=axes,
+        width=np.where(bead, WIDTH, 0.0),
+        height=height,
+        role=np.where(bead, Role.NONPLANAR_INFILL, Role.TRAVEL),
+        layer=layer,
+        speed=np.where(bead, SPEED, TRAVEL),
+    )
+    settings = PrintSettings()
+    write_program(plan_motion(toolpath, profile, settings).program, profile, settings, title="waves", out=path)
+
+
+def layers(machine: str, filament_area: float, segments: int) -> Iterator[str]:
+    """A program of crossed zigzags in planar layers, until there are enough segments."""
+    per_mm = float(bead_area(np.array(WIDTH), np.array(HEIGHT))) / filament_area
+    yield from (f"; machine = {machine}", "G21", "G90", "M83", "G28", "M104 S210", "M109 S210")
+    z = 0.0
+    for k in count():
+        if segments <= 0:
+            break
+        xy = _zigzag(k)[: segments + 1]
+        z += HEIGHT
+        plastic = np.linalg.norm(np.diff(xy, axis=0), axis=1) * per_mm
         yield from (";LAYER_CHANGE", f";WIDTH:{WIDTH}", f";HEIGHT:{HEIGHT}", f";SPEED:{SPEED}", ";ROLE:travel")
-        yield from ("G1 E-0.8 F1800", f"G0 Z{points[:, 2].max() + 6 + wave * 6:.3f} F1200")
-        words = [" ".join(f"{a}{v:.4f}" for a, v in zip(profile.letters, q, strict=True)) for q in joints.tolist()]
-        z = profile.letters.index("Z")
-        start = words[0].split()
-        yield " ".join(["G0", *(w for k, w in enumerate(start) if k != z), "F6000"])
-        yield from (f"G0 {start[z]} F1200", ";ROLE:prime", "G1 E0.8 F1800", ";ROLE:solid_infill")
+        yield from ("G1 E-0.8 F1800", f"G0 Z{z + CLEAR:.3f} F600")
+        words = [f"X{x + MIDDLE:.4f} Y{y + MIDDLE:.4f}" for x, y in xy.tolist()]
+        yield from (f"G0 {words[0]} F6000", f"G0 Z{z:.3f} F600", ";ROLE:prime", "G1 E0.8 F1800", ";ROLE:solid_infill")
         yield from (f"G1 {w} E{e:.5f} F{SPEED * 60:.0f}" for w, e in zip(words[1:], plastic.tolist(), strict=True))
         segments -= len(plastic)
-        layer += 1
-    yield from (";ROLE:retract", "G1 E-0.8 F1800", ";ROLE:travel", "G0 Z200 F1200", "M104 S0", "M84")
+    yield from (";ROLE:retract", "G1 E-0.8 F1800", ";ROLE:travel", f"G0 Z{z + CLEAR:.3f} F600", "M104 S0", "M84")
 
 
-def _zigzag(layer: int, wave: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) mm and tool axes (n, 3) of one layer, in `part`."""
+def _zigzag(layer: int) -> np.ndarray:
+    """(n, 2) mm, X and Y in `part`, of one layer; every other layer is turned by a right angle."""
     along = np.arange(-SIZE / 2, SIZE / 2, SEGMENT)
     across = np.arange(-SIZE / 2, SIZE / 2, PITCH)
     u = np.where(np.arange(len(across))[:, None] % 2, along[::-1], along)
     v = np.broadcast_to(across[:, None], u.shape)
-    x, y = (u, v) if layer % 2 == 0 else (v, u)
-    z = (layer + 1) * HEIGHT + wave * (1 + np.cos(x / 9) * np.cos(y / 9))
-    slope_x, slope_y = (-wave / 9 * f for f in (np.sin(x / 9) * np.cos(y / 9), np.cos(x / 9) * np.sin(y / 9)))
-    normal = np.stack([-slope_x, -slope_y, np.ones_like(z)], axis=-1).reshape(-1, 3)
-    return np.stack([x, y, z], axis=-1).reshape(-1, 3), normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.stack([u, v] if layer % 2 == 0 else [v, u], axis=-1).reshape(-1, 2)
 
 
 if __name__ == "__main__":
