@@ -16,6 +16,7 @@ from trunnion_core.program import MachineProgram
 from trunnion_core.roles import Role
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.joining import DOUBT, ends_kept, step_places
+from trunnion_gcode.waiting import waiting
 from trunnion_gcode.words import carried_ticks, from_ticks, ticks
 
 MERGE_DEVIATION = 0.004
@@ -83,6 +84,9 @@ def make_moves(program: MachineProgram, profile: MachineProfile, dialect: Dialec
         run = np.append(0, np.cumsum(~_alike(moves.row, program)))
         kept[moves.row[~ends_kept(_places(moves, profile), run, dialect.minimum_steps)]] = False
         moves = _measured(kept, program, words, start, profile, dialect)
+    if dialect.planner.slowest > 0:
+        words[moves.row] = _waiting(moves, start, profile, dialect.planner.slowest)
+        moves = _measured(kept, program, words, start, profile, dialect)
     nothing = moves.metric <= 0
     if nothing.any():
         # Out and back, merged, or filament below the last decimal: what it took and fed goes to the next move.
@@ -110,6 +114,26 @@ def joint_decimals(profile: MachineProfile) -> list[int]:
     """Decimals of every joint's word, in profile order."""
     table = profile.gcode
     return [table.decimals_rotary if joint.rotary else table.decimals_linear for joint in profile.joints]
+
+
+def _waiting(moves: Moves, start: IntArray, profile: MachineProfile, slowest: float) -> IntArray:
+    """(m, k) words whose linear ones wait while they creep beside a turn, so that F is not about the creeping.
+
+    Slower than the firmware's `slowest` speed they would drive the turn faster than planned. None waits until it is
+    MERGE_DEVIATION off.
+    """
+    unit = 10.0 ** -np.array(joint_decimals(profile))
+    linear = np.array([not joint.rotary for joint in profile.joints])
+    turns = (moves.word_step[:, ~linear] != 0).any(axis=1)
+    least = np.where(turns, np.minimum(slowest * moves.asked, MERGE_DEVIATION), 0.0)
+    words = moves.joint_ticks.copy()
+    words[:, linear] = waiting(words[:, linear], start[linear], least, unit[linear])
+    return words
+
+
+def _asked(program: MachineProgram) -> FloatArray:
+    """(n,) s that F asks for on every row."""
+    return program.cruise if program.cruise.size else program.duration
 
 
 def _written(program: MachineProgram, words: IntArray, start: IntArray) -> BoolArray:
@@ -222,7 +246,6 @@ def _measured(
     filament_ticks[feeding] = carried_ticks(dialect.extruder, fed, profile.gcode.decimals_extruder)
     filament = from_ticks(filament_ticks, profile.gcode.decimals_extruder)
     rotary = np.array([joint.rotary for joint in profile.joints])
-    asked = program.cruise if program.cruise.size else program.duration
     metric = dialect.metric(word_step[:, ~rotary], word_step[:, rotary], filament)
     if dialect.minimum_steps:
         # Marlin measures what hardly moves the joints over the filament alone.
@@ -237,7 +260,7 @@ def _measured(
         filament_ticks=filament_ticks,
         filament=filament,
         seconds=np.diff(np.cumsum(program.duration)[rows], prepend=0.0),
-        asked=np.diff(np.cumsum(asked)[rows], prepend=0.0),
+        asked=np.diff(np.cumsum(_asked(program))[rows], prepend=0.0),
         metric=metric,
         place=place,
         width=_mean_over_merged(program.width, program.tip_length, rows),

@@ -30,6 +30,8 @@ KLIPPER_CRUISE = 0.5
 """Share of the acceleration that its gentle passes use: one less minimum_cruise_ratio, by default."""
 BENDS = 2
 """Passes over the corners of curves: slower moves make slower corners."""
+OVERLAPS = 4
+"""Passes over moves that overlap: what one is slowed down by the next one makes up for, less each time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ def _blended(program: MachineProgram, ideal: TimeLaw, moves: Moves, drive: "_Dri
     )
     most, tolerance = drive.acceleration[linear], drive.dialect.planner.tolerance
     nominal = drive.nominal
-    for _ in range(BENDS):
+    for _ in range(OVERLAPS):
         _, peak, _, _ = overlapping(replace(path, wanted=nominal), most, tolerance)
         nominal = nominal * np.minimum(1.0, drive.nominal / peak)
     asked = moves.metric / nominal

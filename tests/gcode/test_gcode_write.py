@@ -16,6 +16,7 @@ from trunnion_core.program import Event, MachineProgram
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 from trunnion_gcode.dialect import dialect_names, find_dialect
+from trunnion_gcode.feed import speeds_read
 from trunnion_gcode.moves import MERGE_DEVIATION, make_moves
 from trunnion_gcode.write import write_program
 
@@ -162,6 +163,22 @@ def ring(profile: MachineProfile, step_mm: float) -> MachineProgram:
         layer=np.zeros(rows, dtype=np.int64),
         tip_length=np.full(rows, 0.4),
     )
+
+
+@pytest.mark.parametrize("firmware", ["linuxcnc", "marlin"])
+@pytest.mark.parametrize("step_mm", [0.00001, 0.0001, 0.0003])
+def test_linear_words_that_creep_beside_a_turn_do_not_drive_it(firmware: str, step_mm: float) -> None:
+    """Firmwares read F no slower than a least speed; over 0.1 um in 0.3 s that would be a turn at several times F."""
+    profile, dialect = cradle(firmware), find_dialect(firmware)
+    program = ring(profile, step_mm)
+    program = dataclasses.replace(program, duration=np.full(len(program), 0.3))
+    moves = make_moves(program, profile, dialect)
+    speed = np.maximum(speeds_read(moves, moves.asked, dialect), dialect.planner.slowest)
+    turning = moves.word_step[:, 3] != 0
+    late = np.cumsum(moves.word_step[:, 0]) - program.joints[moves.row, 0]
+    assert np.abs(late).max() <= MERGE_DEVIATION + 1e-4
+    often = moves.metric[turning] / speed[turning] >= 0.999 * moves.asked[turning]
+    assert often.mean() > (0.99 if dialect.planner.slowest * 0.3 < MERGE_DEVIATION else 0.8)
 
 
 @pytest.mark.parametrize("step_mm", [0.0, 0.00003, 0.0004, 0.0009, 0.0011, 0.003])
