@@ -7,8 +7,8 @@ from trunnion_core.layers import Bead
 from trunnion_core.roles import Role
 
 
-def flat_bead(line: FloatArray, z: float, width: float, height: float, role: Role) -> Bead:
-    """A bead over `line` (n, 2) mm whose upper surface lies at `z`, printed with the tool upright."""
+def flat_bead(line: FloatArray, z: float, width: float | FloatArray, height: float, role: Role) -> Bead:
+    """A bead over `line` (n, 2) mm, `width` mm wide or (n,), whose upper surface lies at `z`; the tool is upright."""
     n = len(line)
     return Bead(
         points=np.column_stack([line, np.full(n, z)]),

@@ -28,6 +28,7 @@ from trunnion_slicer.sections import sections
 from trunnion_slicer.skirt import skirt
 from trunnion_slicer.thin import bare, gaps, middle_lines
 from trunnion_slicer.walls import as_multipolygon, offset, opened, rings, wall_lines
+from trunnion_slicer.wedges import laid_length, shared
 
 Areas = NDArray[np.object_]
 """(n,) regions of shapely."""
@@ -212,7 +213,9 @@ def _inside(inside: MultiPolygon, solid: MultiPolygon, top: MultiPolygon, pass_:
     if settings.fill_density > 0 and not sparse.is_empty:
         pitch = pass_.spacing * 100 / settings.fill_density
         lines = fill(settings.fill_pattern, _line_area(sparse, pass_), pitch, pass_.angle, fit=False)
-        beads += [flat_bead(line, pass_.z, pass_.width, pass_.height, Role.INFILL) for line in lines]
+        area = pass_.spacing * pass_.height
+        shares = [shared(line, pass_.spacing) for line in lines]
+        beads += [_shared_bead(line, share * area, Role.INFILL, pass_) for line, share in shares]
     return beads
 
 
@@ -223,14 +226,19 @@ def _solid(region: MultiPolygon, role: Role, pass_: _Pass) -> list[Bead]:
     islands = opened(_line_area(region, pass_), NARROW_FILL * pass_.spacing / 2)
     for island in islands.geoms:
         lines = fill("rectilinear", MultiPolygon([island]), pass_.spacing, pass_.angle)
-        length = sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines)
+        shares = [shared(line, pass_.spacing) for line in lines]
+        length = sum(laid_length(line, share) for line, share in shares)
         if length == 0:
             continue
         flow = offset(island, inset).area / (length * pass_.spacing)
         area = np.clip(flow, *FLOW_BAND) * pass_.spacing * pass_.height
-        width = float(bead_width(area, np.asarray(pass_.height)))
-        beads += [flat_bead(line, pass_.z, width, pass_.height, role) for line in lines]
+        beads += [_shared_bead(line, share * area, role, pass_) for line, share in shares]
     return beads + _thin(bare(region, offset(islands, inset), pass_.width), Role.SOLID_INFILL, pass_)
+
+
+def _shared_bead(line: FloatArray, area: FloatArray, role: Role, pass_: _Pass) -> Bead:
+    """A bead over `line` (n, 2) whose pieces have sections of `area` (n,) mm²."""
+    return flat_bead(line, pass_.z, bead_width(area, np.full(len(area), pass_.height)), pass_.height, role)
 
 
 def _thin(region: MultiPolygon, role: Role, pass_: _Pass) -> list[Bead]:

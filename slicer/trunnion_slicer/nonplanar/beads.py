@@ -111,7 +111,9 @@ def _beads(paths: Sequence[FlatPath], lifted: Lifted, axes: FloatArray, height: 
     starts = lifted.starts
     length = np.zeros(len(axes))
     length[1:] = np.linalg.norm(np.diff(lifted.points, axis=0), axis=1)
-    share = np.repeat([path.share for path in paths], np.diff(starts))
+    share = np.concatenate(
+        [_share(path, lifted.run[a:b]) for path, a, b in zip(paths, starts, starts[1:], strict=False)]
+    )
     # Where a tiny bend was dropped the bead is as thick as on the bend, not fatter for the shorter way.
     area = lifted.volume * share / np.maximum(np.maximum(length, lifted.run), 1e-9)
     first: IntArray = starts[:-1]
@@ -122,3 +124,13 @@ def _beads(paths: Sequence[FlatPath], lifted: Lifted, axes: FloatArray, height: 
         for path, a, b in zip(paths, starts[:-1], starts[1:], strict=True)
         if b - a >= 2
     ]
+
+
+def _share(path: FlatPath, run: FloatArray) -> FloatArray:
+    """Mean share (n,) of the path on pieces that are `run` (n,) mm long, seen from above, one after the other."""
+    length = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
+    along = np.append(0.0, np.cumsum(length))
+    filled = np.append(0.0, np.cumsum(length * path.share[1:]))
+    ends = np.cumsum(run)
+    parts = np.diff(np.interp(ends, along, filled), prepend=0.0)
+    return np.asarray(np.where(run > 0, parts / np.maximum(run, 1e-12), path.share[-1]))

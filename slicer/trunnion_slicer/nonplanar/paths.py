@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPolygon
 
-from trunnion_core.arrays import FloatArray, freeze
+from trunnion_core.arrays import FloatArray, check_array, freeze
 from trunnion_core.bead import bead_spacing
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
@@ -20,6 +20,7 @@ from trunnion_slicer.nonplanar.normals import face_normals
 from trunnion_slicer.nonplanar.offset import Surfaces
 from trunnion_slicer.thin import bare, gaps, middle_lines
 from trunnion_slicer.walls import as_multipolygon, offset, wall_lines, walls
+from trunnion_slicer.wedges import laid_length, shared
 
 STEEP_SHARE = 0.8
 """Share of a patch on which lines are no farther apart than nominal; on the steeper rest beads are laid wider."""
@@ -31,12 +32,13 @@ class FlatPath:
 
     points: FloatArray
     """(n, 2) mm; a closed one ends where it starts."""
-    share: float
-    """mm of footprint across the line that its bead fills."""
+    share: FloatArray
+    """(n,) mm of footprint across the line that its bead fills, on the piece that ends at each point."""
     role: Role
 
     def __post_init__(self) -> None:
-        freeze(self.points)
+        check_array("share", self.share, (len(self.points),))
+        freeze(self.points, self.share)
 
 
 def flat_paths(stack: Surfaces, layer: int, outline: MultiPolygon, settings: PrintSettings) -> list[FlatPath]:
@@ -47,7 +49,11 @@ def flat_paths(stack: Surfaces, layer: int, outline: MultiPolygon, settings: Pri
     count = settings.nonplanar_perimeters
     rings, _ = walls(outline, count, width * squeeze, spacing * squeeze)
     paths = [
-        FlatPath(ring, spacing * squeeze, Role.NONPLANAR_INNER_WALL if index else Role.NONPLANAR_OUTER_WALL)
+        FlatPath(
+            ring,
+            np.full(len(ring), spacing * squeeze),
+            Role.NONPLANAR_INNER_WALL if index else Role.NONPLANAR_OUTER_WALL,
+        )
         for index, ring in rings
     ]
     angle = np.radians(settings.nonplanar_fill_angle + 90.0 * layer)
@@ -61,13 +67,14 @@ def flat_paths(stack: Surfaces, layer: int, outline: MultiPolygon, settings: Pri
     covered = []
     for island in offset(inside, -inset).geoms:
         lines = fill(settings.fill_pattern, MultiPolygon([island]), pitch, float(angle))
-        length = sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines)
+        wedged = [shared(line, pitch) for line in lines]
+        length = sum(laid_length(line, part) for line, part in wedged)
         if length > 0:
             whole = offset(island, inset)
             beside = shapely.union_all(shapely.buffer([LineString(line) for line in lines], pitch / 2))
             missed = bare(whole, as_multipolygon(beside), width)
             share = (whole.area - missed.area) / length
-            paths += [FlatPath(line, share, Role.NONPLANAR_INFILL) for line in lines]
+            paths += [FlatPath(line, part * share, Role.NONPLANAR_INFILL) for line, part in wedged]
             covered.append(whole)
             narrow.append(missed)
     narrow.append(bare(inside, as_multipolygon(shapely.union_all(covered)), width))
@@ -77,7 +84,7 @@ def flat_paths(stack: Surfaces, layer: int, outline: MultiPolygon, settings: Pri
 def _single_lines(region: MultiPolygon, width: float) -> list[FlatPath]:
     """One path along the middle of each place too narrow for more."""
     return [
-        FlatPath(line, float(wide.mean()), Role.NONPLANAR_INFILL)
+        FlatPath(line, np.full(len(line), wide.mean()), Role.NONPLANAR_INFILL)
         for line, wide in middle_lines(region, width)
         if float(wide.mean()) > 0
     ]
