@@ -8,6 +8,10 @@ moves. LinuxCNC and grblHAL have none. Where more than OVERLOOKED of the plastic
 is turned off for the whole program and the words carry all of it (`MachineProgram.advance`): beside a bead with the
 firmware's advance, one with its own in the words would get the step of pressure between them twice or not at all,
 for each firmware in another way.
+
+RepRapFirmware (`Move::AddLinearSegments`, 3.6) adds K times the acceleration of the filament within a move and nothing
+where its speed changes from move to move. On five axes filament to a mm of the joints changes in every row, so that its
+sum drifts from K times the flow. As it follows nothing but ramps, words can carry the rest beside it: it stays on.
 """
 
 import numpy as np
@@ -21,13 +25,17 @@ from trunnion_gcode.words import number
 
 OVERLOOKED = 0.005
 """Share of the plastic that may be laid in moves to which the firmware does not apply its pressure advance."""
+DRIFT = 0.05
+"""Of the flow: by so much may what a firmware adds in ramps alone differ from what the plastic needs."""
 PLASTIC = "; plastic advance [s] = %s"
 """Tells readers how far the filament's drive has to run ahead of the nozzle, whoever sees to it."""
 
 
 def words_carry_advance(moves: Moves, profile: MachineProfile, dialect: Dialect) -> bool:
-    """Whether the filament words have to carry pressure advance, since the firmware would not apply it here."""
-    return profile.extruder.pressure_advance > 0 and overlooked(moves, profile, dialect) > OVERLOOKED
+    """Whether the filament words have to carry pressure advance, or what the firmware would leave out of it here."""
+    if profile.extruder.pressure_advance <= 0:
+        return False
+    return max(overlooked(moves, profile, dialect), drifting(moves, profile, dialect)) > OVERLOOKED
 
 
 def overlooked(moves: Moves, profile: MachineProfile, dialect: Dialect) -> float:
@@ -35,6 +43,27 @@ def overlooked(moves: Moves, profile: MachineProfile, dialect: Dialect) -> float
     laid = np.where((moves.width > 0) & (moves.filament > 0), moves.filament, 0.0)
     total = float(laid.sum())
     return float(laid[_left_out(moves, profile, dialect)].sum()) / total if total > 0 else 0.0
+
+
+def drifting(moves: Moves, profile: MachineProfile, dialect: Dialect) -> float:
+    """Share of the plastic, 0 to 1, that a firmware which follows ramps alone would lay by more than DRIFT off.
+
+    Its sum keeps up with the filament to a unit of way as it was, while pressure forgets within K seconds.
+    """
+    seconds = profile.extruder.pressure_advance
+    laid = (moves.width > 0) & (moves.filament > 0)
+    if seconds <= 0 or not dialect.advance_in_ramps or not laid.any():
+        return 0.0
+    per_length = np.divide(moves.filament, moves.metric, out=np.zeros(len(laid)), where=laid & (moves.metric > 0))
+    took = np.where(laid, moves.asked, 0.0)
+    ends = np.append(0.0, np.cumsum(took))
+    total = np.append(0.0, np.cumsum(per_length * took))
+    begins = np.diff(laid.astype(np.int64), prepend=0) > 0
+    run = ends[np.maximum.accumulate(np.where(begins, np.arange(len(laid)), 0))]
+    since = np.maximum(ends[1:] - seconds, run)
+    mean = (total[1:] - np.interp(since, ends, total)) / np.where(laid, ends[1:] - since, 1.0)
+    off = laid & (np.abs(mean - per_length) > DRIFT * per_length)
+    return float(moves.filament[off].sum() / moves.filament[laid].sum())
 
 
 def advance_lines(carried: float, moves: Moves, profile: MachineProfile, dialect: Dialect) -> list[str]:
@@ -45,11 +74,15 @@ def advance_lines(carried: float, moves: Moves, profile: MachineProfile, dialect
     """
     seconds = profile.extruder.pressure_advance
     if carried > 0:
+        text = number("pressure advance", carried, 4)
+        if dialect.advance_in_ramps and dialect.pressure_advance is not None:
+            rest = "; the filament words carry what the firmware leaves out of it"
+            return [PLASTIC % text, rest, dialect.pressure_advance % text]
         off = [] if dialect.pressure_advance is None else [dialect.pressure_advance % "0"]
-        return [PLASTIC % number("pressure advance", carried, 4), "; the filament words carry it", *off]
+        return [PLASTIC % text, "; the filament words carry it", *off]
     if seconds <= 0:
         return []
-    if words_carry_advance(moves, profile, dialect):
+    if overlooked(moves, profile, dialect) > OVERLOOKED:
         share = 100 * overlooked(moves, profile, dialect)
         raise GcodeError(
             f"{profile.file}: extruder.pressure_advance is {seconds:g} s, but {dialect.name} applies none to "

@@ -62,6 +62,8 @@ class Dialect:
     """Letters of the words of which one has to change for the firmware to apply it."""
     advance_ratio: float = math.inf
     """mm of filament to a mm over those axes beyond which it does not."""
+    advance_in_ramps: bool = False
+    """Whether it only follows the ramps within moves, and leaves out what the flow changes by from move to move."""
     draws_back: bool = True
     """Whether a move of joints may draw filament back without the planner stopping before and after."""
     progress: str | None = "M73 P%d R%d"

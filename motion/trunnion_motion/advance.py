@@ -1,4 +1,4 @@
-"""Turn a program whose firmware applies no pressure advance into one whose filament carries it.
+"""Turn a program whose firmware does not see to all of its pressure advance into one whose filament carries the rest.
 
 What is pushed into the hot end runs ahead of what leaves the nozzle by K times the flow: with E the filament that the
 beads need and K the pressure advance, the drive has to stand at E + K dE/dt. dE/dt follows from the time law that the
@@ -25,6 +25,7 @@ from trunnion_core.roles import Role
 from trunnion_gcode.dialect import Dialect
 from trunnion_kinematics.chain import JointChain
 from trunnion_motion.executed import Execution, executed
+from trunnion_motion.lead import kept_lead
 from trunnion_motion.timelaw import TimeLaw
 
 PIECE = 0.006
@@ -65,7 +66,7 @@ def with_advance(
     """The program with its beads' rows cut at their ramps, and with extruder.pressure_advance in its filament.
 
     `program.cruise` and `ideal` are what `executed` took, `execution` what it made of them; `tool_axes` (n, 3) unit,
-    part, at the rows' ends. The sum of the filament stays what it was. For a planner that stops where filament turns
+    part, at the rows' ends. The sum of the filament stays what it was, with what the firmware adds to it. For a planner that stops where filament turns
     back (`Dialect.draws_back`) such rows of beads feed forwards only, and what that leaves over goes into the next row
     that may draw back, at the latest the retraction.
     """
@@ -74,22 +75,21 @@ def with_advance(
         program = replace(program, cruise=execution.asked)
     linear = _moved(program, profile, "XYZ")
     turning = (linear == 0) & (dialect.planner.corners == "klipper")
-    whole = turning | ((linear > 0) & (linear < LEAST_CUT)) | _too_sharp(program, execution.law, profile)
+    helped = _helped(program, profile, dialect)
+    whole = turning | helped | ((linear > 0) & (linear < LEAST_CUT)) | _too_sharp(program, execution.law, profile)
     row, end = _cuts(program, execution.law, whole, profile, dialect)
     program, ideal = _cut(program, ideal, row, end, profile, dialect)
-    axes, turning = tool_axes[row], turning[row]
+    axes = tool_axes[row]
     inside = end < 1.0
     axes[inside] = JointChain.from_profile(profile).forward(program.joints[inside])[1]
     nominal = program.filament
     program = replace(program, advance=seconds)
-    forwards = (program.width > 0) & (nominal > 0) & (_moved(program, profile, dialect.advance_axes) > 0)
+    forwards = (not dialect.draws_back) & (program.width > 0) & (_moved(program, profile, dialect.advance_axes) > 0)
+    helped = _helped(program, profile, dialect)
     done = executed(program, ideal, profile, dialect, bends=0)
     for _ in range(PASSES):
-        ahead = _ahead(program, nominal, done.law, turning, seconds)
-        place = np.cumsum(nominal) + _gradual(ahead, done.law, JUMP_SHARE * profile.extruder.corner_speed)
-        if not dialect.draws_back:
-            place = _forwards(place, program, forwards, 2 * 10.0**-profile.gcode.decimals_extruder)
-        program = replace(program, filament=np.diff(place, prepend=0.0))
+        ahead, own = _ahead(program, nominal, done.law, (forwards, helped), profile)
+        program = replace(program, filament=np.diff(np.cumsum(nominal) + ahead, prepend=0.0) - own)
         done = executed(program, ideal, profile, dialect, bends=0)
     return Advanced(program, done, nominal, program.tip[1:], axes)
 
@@ -233,58 +233,53 @@ def _cut(
 
 
 def _ahead(
-    program: MachineProgram, nominal: FloatArray, law: TimeLaw, turning: BoolArray, seconds: float
-) -> FloatArray:
-    """(n,) mm that the drive has to be ahead at the end of every row: K times what the bead takes there a second.
+    program: MachineProgram,
+    nominal: FloatArray,
+    law: TimeLaw,
+    marks: tuple[BoolArray, BoolArray],
+    profile: MachineProfile,
+) -> tuple[FloatArray, FloatArray]:
+    """(n,) mm that the drive has to be ahead at the end of every row, and (n,) mm of it that the firmware adds there.
 
-    At the ends of moves that stop whatever they are, it is the pressure that such moves keep up when each lays down
-    what it is fed: a K² (1 - exp(-u / K)) (1 - exp(-(T - u) / K)) / (1 - exp(-T / K)) in filament, for ramps a of u s
-    in T s. Where they are short beside K, that is K times their mean. Where a bead begins or ends, the prime before or
-    the retraction after makes the step; without either the drive is not ahead there.
+    Where a bead begins or ends, the prime before or the retraction after makes the step; without either the drive is
+    not ahead there. `marks` are the rows that have to feed forwards, and those that the firmware helps (`kept_lead`).
+    No row may feed more or less than its beads need by more than the drive can jump: beyond its corner speed the
+    firmware would slow the corner down. There the lag stays instead.
     """
+    forwards, helped = marks
     beads = (program.width > 0) & (nominal > 0)
     live = np.flatnonzero(~beads | (law.duration > 0))
-    bead, ramp = beads[live], law.acceleration[live]
+    bead = beads[live]
     alone = (program.role[live] == Role.RETRACT) | (program.role[live] == Role.PRIME)
-    per_length = np.where(bead, nominal[live] / np.where(bead, law.length[live], 1.0), 0.0)
-    stops = turning[live] & bead
-    whole = np.where(stops, law.duration[live], 1.0)
-    up = np.where(stops, law.peak[live] / np.where(ramp > 0, ramp, 1.0), 0.0)
-    kept = -np.expm1(-up / seconds) * np.expm1(-(whole - up) / seconds) / np.expm1(-whole / seconds)
-    kept *= per_length * ramp * seconds
-    out = np.where(stops, kept, per_length * law.leave[live])[:-1]
-    into = np.where(stops, kept, per_length * law.entry[live])[1:]
-    here, there = bead[:-1], bead[1:]
-    flow = np.where(here & there, 0.5 * (out + into), 0.0)
-    flow = np.where(here & alone[1:], out, np.where(alone[:-1] & there, into, flow))
+    primed, drawn = np.append(False, alone[:-1]), np.append(alone[1:], False)
+    of_live = TimeLaw(**{field.name: getattr(law, field.name)[live] for field in fields(TimeLaw)})
+    apart = JUMP_SHARE * profile.extruder.corner_speed * of_live.duration
+    least = 2 * 10.0**-profile.gcode.decimals_extruder
+    low = np.where(
+        forwards[live], np.maximum(nominal[live] - apart, np.minimum(least, nominal[live])), nominal[live] - apart
+    )
+    before, after, of_firmware = kept_lead(
+        nominal[live],
+        of_live,
+        bead,
+        (primed, drawn),
+        (low, nominal[live] + apart),
+        profile.extruder.pressure_advance,
+        helped[live],
+    )
+    # What is not ahead where a bead ends stands after a prime before the next.
+    ends = bead & ~np.append(bead[1:], False)
+    after = np.where(ends & ~drawn, 0.0, after)
+    begins = np.append(bead[1:] & ~bead[:-1], False)
+    after = np.where(begins & alone, np.append(before[1:], 0.0), after)
     # Rows that take no time are not written: they keep what the row before them has.
     last = np.searchsorted(live, np.arange(len(program)), side="right") - 1
-    ahead = seconds * np.append(flow, 0.0)
-    return np.asarray(np.where(last >= 0, ahead[last], 0.0))
+    own = np.zeros(len(program))
+    own[live] = of_firmware
+    return np.where(last >= 0, after[last], 0.0), own
 
 
-def _gradual(ahead: FloatArray, law: TimeLaw, speed: float) -> FloatArray:
-    """(n,) the largest amounts not above `ahead` that never change by more than `speed` mm/s.
-
-    A ramp takes K times its acceleration more from the drive at once; beyond its corner speed the firmware would slow
-    the corner down, as Marlin and RepRapFirmware slow ramps with their own advance down. Here the lag stays instead.
-    """
-    way = speed * np.cumsum(law.duration)
-    later = way + np.minimum.accumulate(ahead - way)
-    return np.asarray(np.minimum.accumulate((later + way)[::-1])[::-1] - way)
-
-
-def _forwards(place: FloatArray, program: MachineProgram, forwards: BoolArray, least: float) -> FloatArray:
-    """(n,) `place` of the drive, raised so that every row that must feed forwards feeds at least `least` mm.
-
-    What is left over is given back by the next row that may draw back, or in the last beads of the program.
-    """
-    free = (program.role == Role.RETRACT) | (program.role == Role.PRIME) | ((program.width > 0) & ~forwards)
-    step = least * np.cumsum(forwards)
-    run = np.cumsum(free)
-    apart = 1.0 + 10 * float(np.abs(np.diff(place, prepend=0.0)).max(initial=0.0))
-    # A row that is free begins a run, and stands where it should.
-    raised = np.maximum.accumulate(place - step + apart * run) - apart * run + step
-    last = run == run[-1]
-    raised[last] = np.minimum(raised[last], place[-1] - (step[-1] - step[last]))
-    return np.asarray(np.where(free, place, raised))
+def _helped(program: MachineProgram, profile: MachineProfile, dialect: Dialect) -> BoolArray:
+    """(n,) rows of beads to which the firmware's own advance adds the ramps, so that the words carry the rest."""
+    beads = (program.width > 0) & (program.filament > 0)
+    return np.asarray(dialect.advance_in_ramps & beads & (_moved(program, profile, dialect.advance_axes) > 0))

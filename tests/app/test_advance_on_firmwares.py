@@ -23,7 +23,7 @@ AT_SPEED = ("marlin", "reprapfirmware", "grblhal")
 """Those that go through the rows of a ring without slowing down; where every row slows down, lag shows less."""
 WITHIN = {"linuxcnc": 0.08}
 """Of the section wanted, over two rows; 0.05 elsewhere. LinuxCNC lets rows overlap, so their ends are no corners."""
-OFF = {"marlin": "M900 K0", "reprapfirmware": "M572 D0 S0", "klipper": "SET_PRESSURE_ADVANCE ADVANCE=0"}
+OFF = {"marlin": "M900 K0", "reprapfirmware": "M572 D0 S0.05", "klipper": "SET_PRESSURE_ADVANCE ADVANCE=0"}
 K = 0.05
 ROWS, RADIUS = 150, 15.0
 PITCH = 2 * RADIUS * np.sin(0.9 * np.pi / ROWS)

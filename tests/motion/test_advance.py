@@ -84,17 +84,20 @@ def test_nothing_is_gained_or_lost_and_the_machine_moves_as_without(firmware):
 
 @pytest.mark.parametrize("firmware", ["marlin", "grblhal", "reprapfirmware"])
 def test_the_drive_is_ahead_by_k_times_the_rate(firmware):
-    """At the ends of the toolpath's rows, where the executed law says how fast the tip is."""
+    """At the ends of the toolpath's rows, where the executed law says how fast the tip is, and it goes on like that."""
     plain, baked = (plan_motion(RING, on(firmware, seconds), SETTINGS) for seconds in (0.0, K))
     done, before = completed(baked.program), completed(plain.program)
-    bead = baked.program.width[done] > 0
+    law = baked.law
+    steady = (law.peak - np.minimum(law.entry, law.leave) < 0.01 * law.peak)[done]
+    bead = (baked.program.width[done] > 0) & steady & np.append(steady[1:], False)
     laid = plain.program.width > 0
     fed, way = (
         np.bincount(plain.program.source[laid], weights=amount[laid], minlength=len(RING))[bead]
         for amount in (plain.program.filament, plain.program.tip_length)
     )
     lead = np.cumsum(baked.program.filament)[done] - np.cumsum(plain.program.filament)[before]
-    assert_allclose(lead[bead], K * fed / way * baked.law.leave[done][bead], rtol=0.02, atol=1e-4)
+    assert bead.sum() > 100
+    assert_allclose(lead[bead], K * fed / way * law.leave[done][bead], rtol=0.025)
     assert lead.max() > 0.04
 
 
@@ -113,10 +116,25 @@ def test_firmware_that_applies_it_is_left_to_it():
     assert_array_equal(handed.filament, plain.filament)
 
 
+def of_the_firmware(result, profile):
+    """(n,) mm that RepRapFirmware adds to its rows of X and Y: K times what the filament's speed changes within."""
+    program, law = result.program, result.law
+    if profile.firmware != "reprapfirmware":
+        return np.zeros(len(program))
+    step = np.abs(np.diff(program.joints, axis=0, prepend=program.start[None]))
+    across = (step[:, [profile.letters.index(letter) for letter in "XY"]] > 1e-4).any(axis=1)
+    helped = across & (program.width > 0) & (law.length > 0)
+    return np.where(
+        helped, K * program.filament * (law.leave - law.entry) / np.where(law.length > 0, law.length, 1.0), 0.0
+    )
+
+
 def test_duets_feed_forwards_where_x_or_y_moves():
     """Their planner stops where filament turns back in such moves; what is left over the retraction takes."""
     profile = on("reprapfirmware", K)
-    plain, program = (plan_motion(MIXED, on("reprapfirmware", k), SETTINGS).program for k in (0.0, K))
+    plain = plan_motion(MIXED, on("reprapfirmware", 0.0), SETTINGS).program
+    result = plan_motion(MIXED, profile, SETTINGS)
+    program = result.program
     assert program.advance == K
     step = np.abs(np.diff(program.joints, axis=0, prepend=program.start[None]))
     xy = [profile.letters.index(letter) for letter in "XY"]
@@ -124,9 +142,9 @@ def test_duets_feed_forwards_where_x_or_y_moves():
     across = bead & (step[:, xy] > 1e-4).any(axis=1)
     assert program.filament[across].min() >= 1e-5
     assert program.filament[bead & ~across].min() < 0
-    assert program.filament.sum() == pytest.approx(plain.filament.sum(), abs=1e-9)
-    total, nominal = np.cumsum(program.filament), np.cumsum(plain.filament)
-    assert_allclose(total[program.role == Role.RETRACT], nominal[plain.role == Role.RETRACT], atol=1e-9)
+    total = np.cumsum(program.filament + of_the_firmware(result, profile))
+    nominal = np.cumsum(plain.filament)
+    assert_allclose(total[program.role == Role.RETRACT], nominal[plain.role == Role.RETRACT], atol=1e-5)
 
 
 @pytest.mark.parametrize("firmware", ["marlin", "grblhal"])
@@ -148,6 +166,7 @@ def test_events_stay_before_their_rows():
 def test_without_retractions_the_last_bead_takes_what_is_left_over():
     settings = SETTINGS.model_copy(update={"retract_length": 0.0})
     for firmware in FIRMWARES:
-        plain, baked = (plan_motion(MIXED, on(firmware, k), settings).program for k in (0.0, K))
-        if baked.advance > 0:
-            assert baked.filament.sum() == pytest.approx(plain.filament.sum(), abs=1e-9)
+        plain, baked = (plan_motion(MIXED, on(firmware, k), settings) for k in (0.0, K))
+        if baked.program.advance > 0:
+            fed = baked.program.filament + of_the_firmware(baked, on(firmware, K))
+            assert fed.sum() == pytest.approx(plain.program.filament.sum(), abs=1e-5)

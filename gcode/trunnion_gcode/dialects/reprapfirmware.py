@@ -33,5 +33,6 @@ DIALECT = Dialect(
     allow_slower="M203 I%s",
     setup=setup,
     pressure_advance="M572 D0 S%s",
+    advance_in_ramps=True,
     draws_back=False,
 )
