@@ -4,6 +4,7 @@ Run as a script it prints `docs/mutations.md`.
 """
 
 import difflib
+import re
 import tempfile
 from pathlib import Path
 
@@ -77,7 +78,18 @@ def without(start: str) -> list[str]:
 
 MIDDLE = GOOD.index(";ROLE:travel", FIRST) - 1
 HANGING = [";ROLE:travel", "G0 X20 Y0 Z8 F2000", ";ROLE:solid_infill", f"G1 X28 {BEAD} F2400"]
-DROOPING = [";ROLE:travel", "G0 X20 Y0 Z8 F2000", ";ROLE:infill", f"G1 X23.5 E{PER_MM * 3.5:.5f} F2400"]
+RIMS = [
+    line
+    for z in (1.2, 1.5, 1.8)
+    for line in (
+        *(";ROLE:travel", f"G0 Z{z + 1:.1f} F2000", "G0 X1 Y0 F6000", f"G0 Z{z:.1f} F2000", ";ROLE:solid_infill"),
+        *(f"G1 Y8 {BEAD} F2400", f"G1 X5.5 E{PER_MM * 4.5:.5f}", f"G1 Y0 {BEAD}"),
+    )
+]
+DROOPING = [
+    *(*RIMS, ";ROLE:travel", "G0 Z3 F2000", "G0 X3.2 Y2 F6000", "G0 Z1.8 F2000"),
+    *(";ROLE:solid_infill", f"G1 Y5 E{PER_MM * 3:.5f} F2400"),
+]
 TINY = [f"G1 X{8 + i * 0.03:.4f} Y7.7500 Z0.9000 A0.0000 B0.0000 E0.00126 F2400" for i in range(400)]
 
 MUTATIONS: dict[str, list[str]] = {
@@ -97,7 +109,7 @@ MUTATIONS: dict[str, list[str]] = {
     "flow-wrong": with_text(FIRST, BEAD, f"E{PER_MM * SIZE * 2:.5f}"),
     "flow-too-high": everywhere("F2400", "F9000"),
     "nozzle-below-bed": with_text(FIRST, " F2400", " Z-0.05 F2400"),
-    "bead-off-bed": [line.replace("G1 X8.0000", "G1 X108.0000") for line in GOOD],
+    "bead-off-bed": [re.sub(r"X([\d.]+)", lambda x: f"X{float(x[1]) + 100:.4f}", line) for line in GOOD],
     "unknown-command": with_line(LIFTED, "M1234"),
     "unknown-word": with_line(LIFTED, "G0 C30"),
     "unreadable": with_line(LIFTED, "G0 X1\x00\x01"),
@@ -122,7 +134,7 @@ MUTATIONS: dict[str, list[str]] = {
     "wrong-filament": everywhere("filament_diameter = 1.75", "filament_diameter = 2.85"),
     "planner-starved": with_line(LAST + 1, *TINY),
     "bead-in-air": with_line(GOOD.index(";ROLE:retract"), *HANGING),
-    "hanging-infill": with_line(GOOD.index(";ROLE:retract"), *DROOPING),
+    "hanging-bead": with_line(GOOD.index(";ROLE:retract"), *DROOPING),
     "long-bridge": with_line(
         GOOD.index(";ROLE:retract"),
         f"G1 X40 Z0.9 E{PER_MM * 38:.5f} F2400",

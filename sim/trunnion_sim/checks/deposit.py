@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.bead import bead_area
 from trunnion_core.findings import Finding
-from trunnion_core.roles import Role
 from trunnion_sim.context import Context
+from trunnion_sim.openings import openings
 
 CODES = {
     "bead-in-air": ("error", "A whole bead has nothing below it and nothing beside it."),
-    "hanging-infill": ("warning", "A short piece of infill hangs in an opening of what is below; it droops."),
+    "hanging-bead": ("warning", "A short bead touches nothing, within an opening of what is printed; it droops."),
     "long-bridge": ("warning", "A long stretch of a bead hangs in the air."),
     "bead-over-bead": ("error", "A bead is laid where there is a bead already."),
     "crowded-bead": ("warning", "A bead has less than half the room that it was meant for."),
@@ -26,7 +26,8 @@ Floats = NDArray[np.floating[Any]]
 SHORTEST = 2.0
 """mm of bead that is worth a finding."""
 OPENING = 6.0
-"""mm across: openings of ordinary sparse infill, over which slicers start their solid layers."""
+"""mm between what stands on either side: a thread no longer than this that drops there is caught by one of them, as in
+the openings of sparse infill over which slicers start their solid layers."""
 BRIDGE = 20.0
 """mm that ordinary filament bridges with ease."""
 LONGEST_DOUBLE = 10.0
@@ -45,17 +46,17 @@ def check(context: Context) -> Iterator[Finding]:
         return
     bead: IntArray = np.cumsum(~context.feeds, dtype=np.int64)
     meant = context.feeds & ~context.priming
-    laid = _sum(bead, deposit.laid)
-    hanging = _sum(bead, deposit.unsupported)
-    whole = (hanging > 0.95 * laid) & (laid > SHORTEST)
+    laid, rests = _sum(bead, deposit.laid), _sum(bead, deposit.laid - deposit.unsupported)
+    # a bridge rests on something with half a bead's width at either end at least; nothing rests on hardly anything
+    whole = ((rests < context.bead_width) | ((rests < 0.05 * laid) & (laid > 2 * BRIDGE))) & (laid > SHORTEST)
     in_air = whole[bead] & meant & (deposit.laid > 0)
-    across = _across(context, bead, in_air)
-    inside = in_air & np.isin(context.rows.role, (Role.INFILL, Role.SOLID_INFILL)) & (across < OPENING)
+    across = openings(context, bead, in_air, in_air | (deposit.laid == 0), OPENING)
+    inside = across <= OPENING
     yield from context.find(
-        "hanging-infill",
+        "hanging-bead",
         "warning",
         inside,
-        lambda row: f"{laid[bead[row]]:.3g} mm of infill hang in an opening, {across[row]:.2g} mm across",
+        lambda row: f"{laid[bead[row]]:.3g} mm of bead touch nothing in an opening {across[row]:.2g} mm across",
         value=across,
         limit=OPENING,
     )
@@ -100,18 +101,6 @@ def check(context: Context) -> Iterator[Finding]:
         value=deposit.depth,
         limit=DIP * context.layer_height,
     )
-
-
-def _across(context: Context, bead: IntArray, rows: BoolArray) -> FloatArray:
-    """(n,) mm, diagonal in X and Y of everything that a row's bead lays; of `rows` (n,) only, infinite elsewhere."""
-    across = np.full(len(rows), np.inf)
-    which, group = np.unique(bead[rows], return_inverse=True)
-    low, high = np.full((len(which), 2), np.inf), np.full((len(which), 2), -np.inf)
-    for ends in (context.tips[:-1], context.tips[1:]):
-        np.minimum.at(low, group, ends[rows, :2])
-        np.maximum.at(high, group, ends[rows, :2])
-    across[rows] = np.linalg.norm(high - low, axis=1)[group]
-    return across
 
 
 def _thickness(context: Context, volume: FloatArray) -> FloatArray:
