@@ -16,7 +16,7 @@ sum drifts from K times the flow. As it follows nothing but ramps, words can car
 
 import numpy as np
 
-from trunnion_core.arrays import BoolArray
+from trunnion_core.arrays import BoolArray, FloatArray
 from trunnion_core.errors import GcodeError
 from trunnion_core.profile import MachineProfile
 from trunnion_gcode.dialect import Dialect
@@ -91,6 +91,24 @@ def advance_lines(carried: float, moves: Moves, profile: MachineProfile, dialect
         )
     text = number("pressure advance", seconds, 4)
     return [PLASTIC % text, *([] if dialect.pressure_advance is None else [dialect.pressure_advance % text])]
+
+
+def jump_limit(carried: float, moves: Moves, profile: MachineProfile, dialect: Dialect) -> FloatArray:
+    """(m,) mm/s² to which the firmware slows ramps of the filament down under its own advance; inf where it does not.
+
+    Ramps of a make the drive jump by K a. Marlin (LIN_ADVANCE in `Planner::_populate_block`) and RepRapFirmware
+    (`DDA::InitStandardMove`) keep that below the extruder's jerk; Klipper does not. `carried` s are in the words.
+    """
+    seconds, extruder = profile.extruder.pressure_advance, profile.extruder
+    off = carried > 0 and not dialect.advance_in_ramps
+    if seconds <= 0 or off or dialect.planner.corners not in ("marlin", "reprapfirmware"):
+        return np.full(len(moves.row), np.inf)
+    jump, deviation = extruder.corner_speed, profile.planner.junction_deviation
+    if dialect.planner.corners == "marlin" and deviation is not None:
+        # `Planner::recalculate_max_e_jerk`.
+        jump = float(np.sqrt(deviation * extruder.acceleration * np.sqrt(0.5) / (1 - np.sqrt(0.5))))
+    left_out = _left_out(moves, profile, dialect) | (moves.filament <= 0)
+    return np.where(left_out, np.inf, jump / seconds)
 
 
 def _left_out(moves: Moves, profile: MachineProfile, dialect: Dialect) -> BoolArray:

@@ -66,9 +66,9 @@ def with_advance(
     """The program with its beads' rows cut at their ramps, and with extruder.pressure_advance in its filament.
 
     `program.cruise` and `ideal` are what `executed` took, `execution` what it made of them; `tool_axes` (n, 3) unit,
-    part, at the rows' ends. The sum of the filament stays what it was, with what the firmware adds to it. For a planner that stops where filament turns
-    back (`Dialect.draws_back`) such rows of beads feed forwards only, and what that leaves over goes into the next row
-    that may draw back, at the latest the retraction.
+    part, at the rows' ends. The sum of the filament, with what firmware adds that follows ramps alone
+    (`Dialect.advance_in_ramps`), stays what it was. For a planner that stops where filament turns back
+    (`Dialect.draws_back`) such rows of beads feed forwards only.
     """
     seconds = profile.extruder.pressure_advance
     if dialect.planner.corners != "blend":

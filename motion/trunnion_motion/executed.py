@@ -12,6 +12,7 @@ import numpy as np
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_core.program import MachineProgram
+from trunnion_gcode.advance import jump_limit
 from trunnion_gcode.dialect import Dialect
 from trunnion_gcode.feed import speeds_read
 from trunnion_gcode.moves import Moves, make_moves
@@ -198,6 +199,7 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
     else:
         with np.errstate(divide="ignore"):
             reach, push = (speed / np.abs(share)).min(axis=1), (acceleration / np.abs(share)).min(axis=1)
+            push = np.minimum(push, jump_limit(program.advance, moves, profile, dialect) / np.abs(share[:, -1]))
     return _Drive(
         dialect=dialect,
         length=moves.metric,

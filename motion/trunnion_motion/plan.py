@@ -101,6 +101,9 @@ def plan_motion(toolpath: Toolpath, profile: MachineProfile, settings: PrintSett
     if profile.extruder.pressure_advance > 0 and words_carry_advance(
         make_moves(program, profile, dialect), profile, dialect
     ):
+        if not dialect.advance_in_ramps:
+            # The firmware's own, which is turned off, slows ramps down.
+            done = executed(replace(program, advance=profile.extruder.pressure_advance), ideal, profile, dialect)
         advanced = with_advance(program, ideal, done, rows.tool_axes, profile, dialect)
         program, done, nominal = advanced.program, advanced.execution, advanced.nominal
         points, axes = advanced.tip_points, advanced.tool_axes

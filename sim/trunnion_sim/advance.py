@@ -7,19 +7,25 @@ own setting, which nobody here knows, and none is counted. Where the filament's 
 feeding begins at speed, the firmware catches up within its own limits; such a jump has no duration here and no flow.
 """
 
+import math
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from trunnion_core.arrays import FloatArray
 from trunnion_core.profile import MachineProfile
+from trunnion_sim.limits import Limits
 from trunnion_sim.motion import Motion
-from trunnion_sim.replay import Replay
 from trunnion_sim.rules import Rules
+
+if TYPE_CHECKING:
+    from trunnion_sim.replay import Replay
 
 COMMANDS = {"M900": "K", "M572": "S", "SET_PRESSURE_ADVANCE": "ADVANCE"}
 """Commands that set the firmware's advance, and the word with the seconds."""
 
 
-def pushed(replay: Replay, motion: Motion, profile: MachineProfile, rules: Rules, times: FloatArray) -> FloatArray:
+def pushed(replay: "Replay", motion: Motion, profile: MachineProfile, rules: Rules, times: FloatArray) -> FloatArray:
     """(m,) mm³/s that the extruder's motor moves at `times` (m,) s; negative where it is drawn back, 0 at rest.
 
     With pressure advance it runs ahead of what leaves the nozzle: more while the tip speeds up, less while it brakes.
@@ -43,6 +49,24 @@ def own_advance(motion: Motion, profile: MachineProfile, rules: Rules) -> FloatA
     way = np.linalg.norm((motion.joints - motion.before)[:, seen], axis=1)
     little = motion.filament <= rules.advance_ratio * np.where(way > 0, way, 1.0)
     return np.where((motion.filament > 0) & (way > 0) & little, commanded(motion), 0.0)
+
+
+def drive_limit(motion: Motion, profile: MachineProfile, rules: Rules, limits: Limits) -> FloatArray:
+    """(n,) mm/s² that the filament of every row may speed up by under the firmware's own advance; inf without.
+
+    The drive jumps by K times that where a ramp begins. Marlin (`Planner::_populate_block`: MAX_E_JERK over K and the
+    filament to a mm) and RepRapFirmware (`DDA::InitStandardMove`: M566 E over K) lower the acceleration until it may.
+    """
+    if rules.advance == "at once":
+        return np.full(len(motion), np.inf)
+    jump = limits.corner[limits.which, -1]
+    deviation = profile.planner.junction_deviation
+    if rules.corners == "marlin" and deviation is not None and deviation > 0:
+        # Without classic jerk, `recalculate_max_e_jerk`: the corner of 90 degrees that the drive alone would take.
+        half = math.sqrt(0.5)
+        jump = np.sqrt(deviation * half / (1 - half) * limits.acceleration[limits.which, -1])
+    seconds = own_advance(motion, profile, rules)
+    return np.asarray(np.divide(jump, seconds, out=np.full(len(motion), np.inf), where=seconds > 0))
 
 
 def commanded(motion: Motion) -> FloatArray:

@@ -35,12 +35,13 @@ def duet(
     path_limit: _F,
     slowest: _F,
     blocks: int,
+    drive_limit: _F,
 ) -> Law:
     """Every row as RepRapFirmware moves it.
 
     delta (n, k + 1) mm and degrees, the filament last; linear and plane (k + 1,) the linear axes, and X and Y. The
     limits are tables of which row i works under row which[i]: (m, k + 1) each, path (m, 3) mm/s² when printing,
-    travelling and retracting, slowest (m, 1) units/s.
+    travelling and retracting, slowest (m, 1) units/s. `drive_limit` (n,) mm/s² of filament.
     """
     n, columns = delta.shape
     length, asked, nominal, acceleration, corner = np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n), np.zeros(n)
@@ -74,6 +75,8 @@ def duet(
             if r > 0:
                 v = min(v, speed_limit[row, j] / r)
                 a = min(a, acceleration_limit[row, j] / r)
+        if fed != 0:
+            a = min(a, drive_limit[i] * d / abs(fed))
         nominal[i], acceleration[i] = v, a
         if last >= 0 and not stops[i] and kind[i] == kind[last]:
             v = min(nominal[i], nominal[last])

@@ -11,6 +11,7 @@ import numpy as np
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 from trunnion_sim import blends, duet_kernel, motion_kernel, replay_kernel, toolhead_kernel
+from trunnion_sim.advance import drive_limit
 from trunnion_sim.homing import homing_times
 from trunnion_sim.limits import Limits
 from trunnion_sim.merging import blocks_of, laws_of_rows
@@ -187,6 +188,7 @@ def _law(
             limits.path,
             limits.slowest,
             max(rules.least_blocks, profile.planner.blocks),
+            drive_limit(motion, profile, rules, limits),
         )
     else:
         return _marlin(motion, profile, rules, limits, delta, homing, stops, joined)
@@ -236,7 +238,7 @@ def _marlin(
         counts = np.where(np.isfinite(steps), seen * np.where(np.isfinite(steps), steps, 0.0), delta * MANY_STEPS)
         blocks = blocks_of(counts, homing, rules.least_steps - 0.5)
         joined[:] = blocks.shared
-    last_named = named
+    last_named, drive = named, drive_limit(motion, profile, rules, limits)
     if blocks is not None and blocks.merged:
         rows, counts = [blocks.sums(values) for values in rows], blocks.sums(counts)
         last_named = named[blocks.last]
@@ -266,6 +268,7 @@ def _marlin(
         rules.tip_words == "G43.4",
         rows[1],
         rows[2] if rules.tip_words == "never" else last_named,
+        drive if blocks is None or not blocks.merged else drive[blocks.last],
     )
     if blocks is not None and blocks.merged:
         return laws_of_rows(law, blocks, _metric(delta, profile, 0.0))

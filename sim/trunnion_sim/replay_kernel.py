@@ -44,11 +44,12 @@ def plan(
     both_rules: bool,
     seen: _F,
     named: _F,
+    drive_limit: _F,
 ) -> tuple[_F, _F, _F, _F, _F, _F, _F]:
     """Length, asked speed, entry, cruise, exit, acceleration and duration of every row.
 
     `length` (n,) is what F is read over; `delta`, `seen` and `named` (n, k + 1) are what joints and filament change,
-    the same as the corners see it, and what the words change.
+    the same as the corners see it, and what the words change. `drive_limit` (n,) mm/s² of filament.
     """
     n, columns = delta.shape
     k = columns - 1
@@ -82,6 +83,8 @@ def plan(
             if r > 0:
                 v = min(v, speed_limit[lim, j] / r)
                 a = min(a, acceleration_limit[lim, j] / r)
+        if delta[i, k] != 0:
+            a = min(a, drive_limit[i] * d / abs(delta[i, k]))
         nominal[i] = v
         acceleration[i] = a
     corner, start = _corners(

@@ -63,7 +63,7 @@ def test_klipper_moves_as_klippers_own_classes():
     np.testing.assert_allclose(duration, KLIPPER[:, 10], atol=2e-8)
 
 
-def on_duet(delta, feed, path=(np.inf, np.inf, np.inf), slowest=0.5):
+def on_duet(delta, feed, path=(np.inf, np.inf, np.inf), slowest=0.5, drive=np.inf):
     """Limits of every column: 100 units/s, 1000 units/s², 8 units/s at corners."""
     delta = np.array(delta, dtype=float)
     n = len(delta)
@@ -71,7 +71,7 @@ def on_duet(delta, feed, path=(np.inf, np.inf, np.inf), slowest=0.5):
     plane = np.array([True, True, False, False, False, False])
     return duet(
         delta, LINEAR, plane, np.full(n, feed), np.zeros(n, bool), np.zeros(n, bool), np.zeros(n, np.int64),
-        *table, np.array([path]), np.array([[slowest]]), 40,
+        *table, np.array([path]), np.array([[slowest]]), 40, np.full(n, drive),
     )  # fmt: skip
 
 
@@ -99,6 +99,11 @@ def test_a_duet_melds_moves_of_one_kind(pair):
 def test_a_duet_limits_paths_of_x_and_y_only():
     acceleration = on_duet([BEAD, [10, 0, 0, 0, 0, 0], CLIMB, TURN], 50, path=(300.0, 500.0, np.inf))[5]
     np.testing.assert_allclose(acceleration, [300.0, 500.0, 1000.0, 1000.0])
+
+
+def test_a_duet_slows_ramps_down_for_its_own_advance():
+    """BEAD has 0.04 mm of filament to a mm: 20 mm/s² of filament are 500 along the way."""
+    np.testing.assert_allclose(on_duet([BEAD, [10, 0, 0, 0, 0, 0]], 50, drive=20.0)[5], [500.0, 1000.0])
 
 
 def test_a_duet_creeps_no_slower_than_it_was_told():
