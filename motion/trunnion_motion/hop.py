@@ -1,9 +1,9 @@
 """Turn two joint states into a safe way between them: up along the tool, over, down along the tool.
 
 Used where the machine has to turn far without printing: from home to the first point, where a rotary is rewound, where
-the machine changes from one joint solution to the other, and to leave the part at the end. Over means: the rotaries
-turn while the tip stays on a straight line at the clear height; where the linear joints are too short for that, all
-joints go straight and the tip is checked to stay high.
+the machine changes from one joint solution to the other, and to leave the part upright at the end. Over means: the
+rotaries turn while the tip stays on a straight line at the clear height; where the linear joints are too short for
+that, all joints go straight and the tip is checked to stay high.
 """
 
 from dataclasses import dataclass
@@ -73,6 +73,30 @@ def hop(machine: Machine, start: FloatArray, end: FloatArray, clear_z: float) ->
         joints = end[None]
     points, tool_axes = machine.chain.forward(joints)
     return Hop(joints, points, tool_axes, clear)
+
+
+def upright(machine: Machine, joints: FloatArray, clear_z: float) -> Hop | None:
+    """From joints (k,) up along the tool to `clear_z`, and there the rotaries to zero or whole turns of it.
+
+    With the tip where it is, else over the middle of the bed, else where all joints are at home. None where none of
+    these ways is clear.
+    """
+    profile, chain = machine.profile, machine.chain
+    up = leave(machine, joints, clear_z)
+    level = up.copy()
+    for column in profile.rotary:
+        zero = 2 * np.pi * np.round(up[column] / (2 * np.pi))
+        level[column] = zero if machine.low[column] <= zero <= machine.high[column] else profile.joints[column].home
+    here = chain.forward(up[None])[0][0]
+    home = profile.array("home").copy()
+    home[list(profile.rotary)] = level[list(profile.rotary)]
+    middle = np.array([0.0, 0.0, max(here[2], clear_z)])
+    for end in (*_at(chain, np.stack([here, middle]), level), home):
+        if machine.inside(end[None]):
+            way = hop(machine, joints, end, clear_z)
+            if way.clear:
+                return way
+    return None
 
 
 def leave(machine: Machine, joints: FloatArray, clear_z: float) -> FloatArray:

@@ -2,7 +2,8 @@
 
 The toolpath is cut where the joints cannot simply go on: at the start, at rewinds, and at travels on which the machine
 would change to its other joint solution, swinging the tool far from the straight turn. Between cuts the rows are
-subdivided so that the tip stays on its chords; at a cut a hop leads over the part.
+subdivided so that the tip stays on its chords; at a cut a hop leads over the part. At the end the rotaries are level:
+firmware that leaves tip control takes the words for joints then, and what is said after it moves where it says.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
 from trunnion_kinematics.branches import PathChoice
 from trunnion_kinematics.subdivide import Subdivision, subdivide
-from trunnion_motion.hop import CLEARANCE, HOME_CLEARANCE, Hop, Machine, hop, leave, same_pose_near
+from trunnion_motion.hop import CLEARANCE, HOME_CLEARANCE, Hop, Machine, hop, leave, same_pose_near, upright
 from trunnion_motion.rows import Rows, joined, travelling
 
 SWING_DEG = 10.0
@@ -38,7 +39,7 @@ class _Assembly:
 def assemble(
     toolpath: Toolpath, machine: Machine, choice: PathChoice, settings: PrintSettings, home: FloatArray
 ) -> tuple[Rows, tuple[Finding, ...]]:
-    """Rows from `home` (k,) through the toolpath (at least one row) to a last lift; without filament."""
+    """Rows from `home` (k,) through the toolpath (at least one row) to a last lift, upright; without filament."""
     z = np.where(toolpath.extrudes, toolpath.points[:, 2], -np.inf)
     z[:-1] = np.maximum(z[:-1], np.where(toolpath.extrudes[1:], toolpath.points[:-1, 2], -np.inf))
     printed = np.maximum.accumulate(z)
@@ -51,10 +52,14 @@ def assemble(
         blocks += _stretch(work, int(first), int(last), home, findings)
     last_layer = int(toolpath.layer[-1])
     top = max(printed[-1], toolpath.points[-1, 2])
-    parked = leave(machine, choice.joints[-1], top + PARK_HEIGHT)
-    if (parked != choice.joints[-1]).any():
-        points, axes = machine.chain.forward(parked[None])
-        blocks.append(travelling(parked[None], points, axes, last_layer, settings.travel_speed))
+    last = choice.joints[-1]
+    way = upright(machine, last, top + PARK_HEIGHT)
+    parked = leave(machine, last, top + PARK_HEIGHT)[None] if way is None else way.joints
+    if (parked != last).any():
+        points, axes = machine.chain.forward(parked)
+        blocks.append(travelling(parked, points, axes, last_layer, settings.travel_speed))
+    if way is None:
+        findings.append(_parked_tilted(points=toolpath.points[-1], layer=last_layer))
     return joined(blocks), tuple(findings)
 
 
@@ -116,6 +121,18 @@ def _swings(work: _Assembly) -> IntArray:
     size = np.linalg.norm(straight, axis=1)
     cosine = np.einsum("ij,ij->i", middle, straight) / np.maximum(size, 1e-12)
     return np.asarray(rows[(cosine < np.cos(np.radians(SWING_DEG))) | (size < 1e-12)])
+
+
+def _parked_tilted(points: FloatArray, layer: int) -> Finding:
+    x, y, z = (float(value) for value in points)
+    return Finding(
+        "parked-tilted",
+        "warning",
+        "the program ends with the rotary joints turned: the machine's limits leave no way to level them clear of the "
+        "part",
+        layer=layer,
+        point=(x, y, z),
+    )
 
 
 def _said(work: _Assembly, row: int, way: Hop, travels: bool) -> list[Finding]:

@@ -97,6 +97,21 @@ def test_travel_does_not_sink_below_its_straight_way(profile, dome, settings):
     assert z[program.role == Role.TRAVEL].min() > -0.3
 
 
+def test_the_end_is_upright_over_the_part(profile, dome, settings):
+    """So words mean the same with and without tip control, and the table is level for whoever takes the part off."""
+    result = plan_motion(dome, profile, settings)
+    program = result.program
+    turns = program.joints[-1, list(profile.rotary)] / (2 * np.pi)
+    assert_allclose(turns, np.rint(turns), atol=1e-12)
+    assert result.tool_axes[-1, 2] == pytest.approx(1.0, abs=1e-12)
+    assert not any(finding.code == "parked-tilted" for finding in result.findings)
+    last = int(np.flatnonzero(program.source >= 0)[-1])
+    turning = (np.diff(program.joints[:, list(profile.rotary)], axis=0) != 0).any(axis=1)
+    inside = between(program)[np.flatnonzero(turning[last:]) + last + 1]
+    tips = JointChain.from_profile(profile).forward(inside.reshape(-1, inside.shape[2]))[0]
+    assert tips[:, 2].min(initial=np.inf) > result.tip_points[: last + 1, 2][program.width[: last + 1] > 0].max() + 5.0
+
+
 def test_no_joint_leaves_its_limits_or_caps(profile, dome, settings):
     result = plan_motion(dome, profile, settings)
     program, law = result.program, result.law
