@@ -153,7 +153,7 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
             at, made = kernel.execute(
                 at, block.letter, block.code, block.flags, block.word_start, block.word_letter, block.word_value,
                 block.line, block.length, letters, rotary, home, rules.g90_resets_e, rules.case_sensitive,
-                ord(rules.filament), state, out, row_of_command, problem, len(store),
+                rules.whole_percent, ord(rules.filament), state, out, row_of_command, problem, len(store),
             )  # fmt: skip
             store.take(made)
             if len(store) > MOST_ROWS:

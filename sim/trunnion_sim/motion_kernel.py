@@ -90,6 +90,7 @@ def execute(
     home: NDArray[np.float64],
     g90_resets_e: bool,
     case_sensitive: bool,
+    whole_percent: bool,
     feeder: int,
     state: NDArray[np.float64],
     out: Rows,
@@ -126,9 +127,9 @@ def execute(
             elif c == 830:
                 state[_EREL] = 1
             elif c == 2200 and value[83] > 0:
-                state[_SPEED] = value[83] / 100
+                state[_SPEED] = max(math.floor(value[83]), 1.0) / 100 if whole_percent else value[83] / 100
             elif c == 2210 and value[83] > 0:
-                state[_FLOW] = value[83] / 100
+                state[_FLOW] = math.floor(value[83]) / 100 if whole_percent else value[83] / 100
             elif c == 2000:  # volumetric: E is mm³ of filament of that diameter
                 if value[68] >= 0:
                     state[_AREA] = math.pi / 4 * value[68] ** 2

@@ -47,6 +47,8 @@ class Rules:
     """Motor steps on some axis below which a move is left to the next one; corners see whole steps then. 0: neither."""
     shortest_linear: float = 0.0
     """mm: F is read over the rotaries where linear motion is no longer than this."""
+    whole_percent: bool = False
+    """Whether M220 and M221 read whole percents."""
     filament: str = "E"
     """Letter of the filament."""
     tip_words: Literal["never", "G43.4", "always"] = "never"

@@ -49,3 +49,16 @@ def test_rows_that_marlin_joins_run_at_the_speed_of_the_last(tmp_path: Path) -> 
     assert "tip-too-fast" in judge(path, profile).counts
     path.write_text("\n".join(line({40: 3 * WANTED}, step=0.05)) + "\n")
     assert "tip-too-fast" not in judge(path, profile).counts
+
+
+@pytest.mark.parametrize(("firmware", "speed"), [("marlin", 9.9), ("klipper", 9.99)])
+def test_marlin_reads_whole_percents(tmp_path: Path, firmware: str, speed: float) -> None:
+    """`M220.cpp` and `M221.cpp` read integers, other firmwares take the fraction."""
+    program = line({})
+    first = program.index(";SPEED:10.0")
+    path = tmp_path / "percent.gcode"
+    path.write_text("\n".join([*program[:first], "M220 S99.9", "M221 S99.9", *program[first:]]) + "\n")
+    context = context_of(path, dataclasses.replace(load_profile("generic_ab_cradle"), firmware=firmware))
+    bead = context.feeds
+    assert context.motion.feed[bead] == pytest.approx(speed)
+    assert context.motion.filament[bead] == pytest.approx(STEP * PER_MM * speed / WANTED)

@@ -27,6 +27,7 @@ RULES = Rules(
     first_move_delay=0.1,
     homes_in_turn=True,
     least_steps=6,
+    whole_percent=True,
     shortest_linear=1e-3,
     advance_axes="XYZ",
     advance_ratio=3.0,
