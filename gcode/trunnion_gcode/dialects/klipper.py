@@ -41,7 +41,7 @@ def setup(profile: MachineProfile) -> tuple[str, ...]:
     filament = [
         f"max_extrude_only_velocity: {said(extruder.speed)}, max_extrude_only_accel: {said(extruder.acceleration)}",
         f"instantaneous_corner_velocity: {said(extruder.corner_speed)}",
-        f"max_extrude_cross_section: {said(ANY_SECTION)} (where the part turns, X, Y and Z may hardly move)",
+        f"max_extrude_cross_section = {said(ANY_SECTION)} (where the part turns, X, Y and Z may hardly move)",
     ]
     return (
         *(f"{RELIES} [printer] {line}" for line in printer),
