@@ -83,5 +83,7 @@ def test_no_thin_beads_where_walls_and_infill_fit() -> None:
     mesh, _ = extruded(m3.CrossSection.square((20, 20)) + m3.CrossSection.circle(8, 96).translate((10, 20)), 3)
     for layer in planar_layers(mesh, DENSE):
         for bead in layer.beads:
-            assert bead.closed or np.ptp(bead.width) == 0
-            assert np.linalg.norm(np.diff(bead.points, axis=0), axis=1).sum() > 10
+            length = np.linalg.norm(np.diff(bead.points, axis=0), axis=1)
+            whole = bead.width[1:] > bead.width.max() - 1e-9  # but for the wedges of its turns
+            assert bead.closed or length[whole].sum() > 0.9 * length.sum()
+            assert length.sum() > 10
