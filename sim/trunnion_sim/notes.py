@@ -13,6 +13,7 @@ from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.roles import Role
 from trunnion_sim.comments import OTHER, Meaning, meaning
 from trunnion_sim.reader import Block
+from trunnion_sim.stated import RELIES
 
 LAST_LAYER = 1_000_000_000
 HEADER_KEYS = 2000
@@ -25,6 +26,8 @@ class Notes:
 
     header: dict[str, str] = field(default_factory=dict)
     """Values of `; key = value` comments; the last one counts."""
+    relies: list[str] = field(default_factory=list)
+    """What follows `; the plan relies on`."""
     _events: dict[str, tuple[list[int], list[float]]] = field(
         default_factory=lambda: {key: ([], []) for key in ("type", "role", "width", "height", "speed", "layer")}
     )
@@ -55,6 +58,9 @@ class Notes:
             values.append(float(self._layer) if key == "layer" else value)
 
     def _header(self, text: bytes) -> None:
+        words = text.decode("utf-8", "replace").strip()
+        if words.startswith(RELIES) and len(self.relies) < HEADER_KEYS:
+            self.relies.append(words[len(RELIES) :])
         name, equals, value = text.partition(b" = ")
         if equals and len(self.header) < HEADER_KEYS:
             self.header[name.strip().decode("utf-8", "replace")] = value.strip().decode("utf-8", "replace")

@@ -137,6 +137,7 @@ MUTATIONS: dict[str, list[str]] = {
     "wrong-machine": everywhere("generic_ab_cradle", "open5x_voron0"),
     "wrong-firmware": everywhere("firmware = marlin", "firmware = reprapfirmware"),
     "wrong-filament": everywhere("filament_diameter = 1.75", "filament_diameter = 2.85"),
+    "other-limits": with_line(3, "; the plan relies on M203 X200 Y300 Z40 A180 B180 E60"),
     "planner-starved": with_line(LAST + 1, *TINY),
     "bead-in-air": with_line(GOOD.index(";ROLE:retract"), *HANGING),
     "hanging-bead": with_line(GOOD.index(";ROLE:retract"), *DROOPING),
