@@ -28,8 +28,8 @@ INSIDE = 0.98
 """Share of the cone that is aimed at, so that the last step has next to nothing to do."""
 FIRST, SOFTEST, STIFFEST = 0.3, 0.03, 1e5
 """What the springs towards the normals start with, and their bounds, as factors on the soft ones."""
-UPRIGHT = 1e-12
-"""Share of a spring that holds the heading of an upright tool where it is, since nothing else does."""
+DAMPING = 1e-11
+"""Share of the stiffest bending by which every step is held back: the heading of an upright tool has no spring."""
 
 
 def smoothed(
@@ -105,7 +105,7 @@ def _even(
     heading = headings(normals, starts, tolerance)
     axes = normals
     for _ in range(ROUNDS):
-        pull, hold = springs * arm, soft * (wanted_arm + UPRIGHT)
+        pull, hold = springs * arm, soft * wanted_arm
         force = pull * _nearest_half_turn(to_normal, heading) + hold * _nearest_half_turn(to_wanted, heading)
         heading = heading + _solved(band, pull + hold, force - banded(band, heading))
         along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
@@ -124,5 +124,5 @@ def _nearest_half_turn(target: FloatArray, heading: FloatArray) -> FloatArray:
 
 def _solved(band: FloatArray, springs: FloatArray, force: FloatArray) -> FloatArray:
     total = band.copy()
-    total[2] += springs
+    total[2] += springs + DAMPING * band[2].max()
     return np.asarray(solveh_banded(total, force, overwrite_ab=True, overwrite_b=True, check_finite=False))
