@@ -176,7 +176,7 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
     acceleration = np.append(profile.array("acceleration") * profile.to_shown, extruder.acceleration)
     printing = UNLIMITED if planner.acceleration is None else planner.acceleration
     travelling = printing if planner.travel_acceleration is None else planner.travel_acceleration
-    kind = _kinds(moves, profile)
+    kind = _kinds(moves.word_step if of_words else moves.step, moves.filament, profile)
     along = np.where(kind & 1, np.where(moves.filament != 0, printing, travelling), UNLIMITED)
     if dialect.planner.corners == "reprapfirmware":
         kind = _melded_kinds(moves, profile)
@@ -231,12 +231,12 @@ def _in_steps(steps: FloatArray, program: MachineProgram, profile: MachineProfil
     return whole
 
 
-def _kinds(moves: Moves, profile: MachineProfile) -> IntArray:
-    """(m,) 1 where joints move, 2 where linear ones do, 4 where filament moves, added up."""
+def _kinds(step: FloatArray, filament: FloatArray, profile: MachineProfile) -> IntArray:
+    """(m,) 1 where joints move by `step` (m, k), 2 where linear ones do, 4 where filament (m,) moves, added up."""
     linear = np.array([not joint.rotary for joint in profile.joints])
-    joints = (moves.step != 0).any(axis=1)
-    straight = (moves.step[:, linear] != 0).any(axis=1)
-    return np.asarray(joints + 2 * straight + 4 * (moves.filament != 0))
+    joints = (step != 0).any(axis=1)
+    straight = (step[:, linear] != 0).any(axis=1)
+    return np.asarray(joints + 2 * straight + 4 * (filament != 0))
 
 
 def _melded_kinds(moves: Moves, profile: MachineProfile) -> IntArray:

@@ -198,3 +198,15 @@ def test_the_software_machine_takes_the_planned_time(machine, tmp_path):
     began = firmware.now
     send([line for line in lines if line.startswith(("G0 ", "G1 "))] + ["M400"])
     assert firmware.now - began == pytest.approx(program.duration.sum(), rel=0.03)
+
+
+@pytest.mark.parametrize("firmware", TIP_FIRMWARES)
+def test_turns_with_the_tip_held_take_their_time(firmware):
+    """The words of X, Y and Z stand while the joints behind them move: the planner sees the words."""
+    profile = on_firmware(load_profile("open5x_voron0"), firmware)
+    flat = TOOLPATHS["dome"]
+    few = dataclasses.replace(
+        flat, **{field.name: getattr(flat, field.name)[:40] for field in dataclasses.fields(flat)}
+    )
+    found = agreement(plan_motion(few, profile, SETTINGS), profile, SETTINGS)
+    assert found.time_ratio == pytest.approx(1.0, abs=2e-3)
