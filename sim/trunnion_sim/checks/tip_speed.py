@@ -22,7 +22,10 @@ SLOW_SHARE = 0.3
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """Tip speed from the replayed time law against the wanted speed that the comments name."""
+    """Tip speed from the replayed time law against the wanted speed that the comments name, each row by itself.
+
+    Nothing is averaged over neighbours: words of any length have an F that gives the tip its speed.
+    """
     wanted = context.rows.speed
     rows = context.feeds & np.isfinite(wanted) & (wanted > 0) & (context.replay.length > 0)
     if not rows.any():
@@ -30,7 +33,7 @@ def check(context: Context) -> Iterator[Finding]:
     length = context.driven_length
     per_length = length / np.where(context.replay.length > 0, context.replay.length, 1.0)
     fastest = per_length * context.replay.cruise
-    limit = wanted * FAST + FAST_BY  # of every row by itself: words of any length give a written program its speed
+    limit = wanted * FAST + FAST_BY
     yield from context.find(
         "tip-too-fast",
         "error",
