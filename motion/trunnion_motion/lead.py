@@ -100,16 +100,27 @@ def kept_lead(
         each = weight / np.maximum(np.abs(flow - wanted), SMALL)
     own = np.where(beads, added * allowed * amount, 0.0)
     gained = np.where(beads, allowed * amount - nominal + own, 0.0)
-    before, after = _along(np.where(beads, pressure[:-1], 0.0), gained, beads)
+    room = amount * np.minimum(np.minimum(allowed - low, high - allowed), 1.0)
+    before, after = _along(pressure, gained, np.where(beads, room, 0.0), beads)
     return before, after, own
 
 
-def _along(before: FloatArray, gained: FloatArray, beads: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Lead before and after every row, from the pressure before a run of beads and what its rows push beyond theirs."""
+def _along(
+    pressure: FloatArray, gained: FloatArray, room: FloatArray, beads: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Lead before and after every row, from pressures at the rows' ends and what the rows push beyond their need.
+
+    What a run of beads would lay too much or too little in all is spread over it, where there is `room` for more or
+    less, so that its lead ends at the pressure.
+    """
     starts = np.diff(beads.astype(np.int64), prepend=0) > 0
+    run = np.cumsum(starts)
+    of_run = [np.bincount(run, weights=np.where(beads, values, 0.0)) for values in (gained, np.diff(pressure), room)]
+    missing = np.divide(of_run[1] - of_run[0], of_run[2], out=np.zeros(len(of_run[0])), where=of_run[2] > 0)
+    gained = gained + missing[run] * room
+    first = np.maximum.accumulate(np.where(starts, np.arange(len(beads)), 0))
     total = np.cumsum(gained)
-    run = np.maximum.accumulate(np.where(starts, np.arange(len(beads)), 0))
-    base = before[run] - (total - gained)[run]
+    base = pressure[:-1][first] - (total - gained)[first]
     return np.where(beads, base + total - gained, 0.0), np.where(beads, base + total, 0.0)
 
 
