@@ -1,16 +1,19 @@
 """Draw the flow out of the nozzle without and with pressure advance: docs/pictures/pressure_advance.png.
 
     python bench/pressure.py [OUT.png]
+    python bench/pressure.py --table [--machines NAME,...]
 
 A square spiral whose corners slow the tip down, on grblHAL, which has no pressure advance of its own; and a ring that
 only the platter turns, on RepRapFirmware, which leaves it out there. Both programs are judged by the software machine,
-with a plastic that follows its drive by 0.05 s. Prints how much of the way is within 5 % of the section wanted.
+with a plastic that follows its drive by 0.05 s. Prints how much of the way is within 5 % of the section wanted. The table is of the free-form sample on every firmware, whatever would
+be chosen there: no advance, the firmware's alone, and that of the words (beside the firmware's on RepRapFirmware).
 """
 
+import argparse
 import dataclasses
-import sys
 import tempfile
 from pathlib import Path
+from unittest.mock import patch
 
 import matplotlib
 
@@ -19,17 +22,25 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
+from trunnion import samples
+from trunnion.pipeline import settings_for, solid_part
 from trunnion_core.arrays import FloatArray
 from trunnion_core.bead import bead_area
-from trunnion_core.profile import load_profile
+from trunnion_core.profile import MachineProfile, load_profile
 from trunnion_core.roles import Role
 from trunnion_core.settings import PrintSettings
 from trunnion_core.toolpath import Toolpath
+from trunnion_gcode.dialect import dialect_names, find_dialect
 from trunnion_gcode.write import write_program
 from trunnion_motion.plan import plan_motion
-from trunnion_sim.judge import context_of
+from trunnion_sim.context import Context
+from trunnion_sim.judge import context_of, judge
+from trunnion_sim.rules import firmware_names
+from trunnion_slicer.slice import slice_mesh
 
 SECONDS = 0.05
+OF_SAMPLE = 0.04
+"""s of the plastic of the table."""
 WIDTH, HEIGHT = 0.4, 0.3
 STEP = 0.2
 """mm of path over which flow is averaged."""
@@ -37,8 +48,83 @@ STEP = 0.2
 
 def main() -> None:
     """Plan, judge, draw, write."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--table", action="store_true", help="the table of the free-form sample instead")
+    options.add_argument("--machines", default="generic_ab_cradle,open5x_voron0")
     pictures = Path(__file__).parents[1] / "docs" / "pictures"
-    out = Path(sys.argv[1]) if len(sys.argv) > 1 else pictures / "pressure_advance.png"
+    options.add_argument("out", nargs="?", type=Path, default=pictures / "pressure_advance.png")
+    chosen = options.parse_args()
+    if chosen.table:
+        table(chosen.machines.split(","))
+    else:
+        draw(chosen.out)
+
+
+def table(machines: list[str]) -> None:
+    """Print how much of the way of the free-form sample's beads has the section wanted, for every firmware."""
+    print(f"{'machine':20}{'firmware':16}{'advance':10}{'within 5 %':>11}{'within 10 %':>12}{'off':>7}{'wrong':>7}")
+    settings = PrintSettings(**samples.settings("freeform"))
+    for machine in machines:
+        profile = load_profile(machine)
+        part = solid_part("freeform", samples.make("freeform"), profile, settings)
+        toolpath = slice_mesh(part.mesh, settings_for(profile, settings)).toolpath
+        for firmware in sorted(set(dialect_names()) & set(firmware_names())):
+            other = dataclasses.replace(profile, firmware=firmware)
+            dialect = find_dialect(firmware)
+            if dialect.refuses(other):
+                continue
+            names = {"none": None, "handed": False, "words": True}
+            for name, carried in names.items():
+                if name == "handed" and dialect.pressure_advance is None:
+                    continue
+                with tempfile.TemporaryDirectory() as folder:
+                    file = Path(folder) / "freeform.gcode"
+                    context = _judged(toolpath, other, settings, carried, file)
+                    counts = judge(file, context.profile).counts
+                close, fair = shares(context)
+                print(
+                    f"{machine:20}{firmware:16}{name:10}{close:11.1%}{fair:12.1%}{counts.get('flow-off', 0):7}"
+                    f"{counts.get('flow-wrong', 0):7}",
+                    flush=True,
+                )
+
+
+def _judged(
+    toolpath: Toolpath, profile: MachineProfile, settings: PrintSettings, carried: bool | None, file: Path
+) -> Context:
+    """The program without advance (None), with the firmware's alone (False) or with that of the words (True)."""
+    seconds = 0.0 if carried is None else OF_SAMPLE
+    extruder = profile.extruder.model_copy(update={"pressure_advance": seconds})
+    profile = dataclasses.replace(profile, extruder=extruder)
+    with patch("trunnion_motion.plan.words_carry_advance", lambda *_: carried is True):
+        program = plan_motion(toolpath, profile, settings).program
+    write_program(program, profile, settings, title="freeform", out=file)
+    if carried is None:
+        file.write_text(f"; plastic advance [s] = {OF_SAMPLE}\n" + file.read_text())
+    return context_of(file, profile)
+
+
+def shares(context: Context) -> tuple[float, float]:
+    """Share of the beads' way, STEP mm at a time, that is within 5 % and within 10 % of the section wanted."""
+    pressure, replay = context.pressure, context.replay
+    if pressure is None:
+        raise RuntimeError("the judge did not see what the plastic's pressure advance is")
+    times = np.arange(0, replay.time, 2e-4)
+    row, fraction, _ = replay.at(times)
+    width, height = context.rows.width, context.rows.height
+    bead = context.feeds & context.rows.bead & (width > 0) & (height > 0)
+    length = np.where(bead, context.tip_length, 0.0)
+    section = np.where(bead, bead_area(np.where(bead, width, 1.0), np.where(bead, height, 1.0)), 0.0)
+    along = (np.cumsum(length) - length)[row] + fraction * length[row]
+    laid = np.where(bead[row], pressure.flow_at(replay, times), 0.0) * context.profile.filament_area * 2e-4
+    cuts = np.arange(0, length.sum(), STEP)
+    ways, volumes = np.append(0.0, np.cumsum(length)), np.append(0.0, np.cumsum(length * section))
+    ratio = np.histogram(along, cuts, weights=laid)[0] / np.diff(np.interp(cuts, ways, volumes))
+    return float((np.abs(ratio - 1) < 0.05).mean()), float((np.abs(ratio - 1) < 0.1).mean())
+
+
+def draw(out: Path) -> None:
+    """The two paths, as a picture."""
     figure, axes = plt.subplots(2, 1, figsize=(11, 6), dpi=80)
     cases = (
         (spiral(), "generic_ab_cradle", "grblhal", "square spiral, 40 mm/s, on grblHAL"),
