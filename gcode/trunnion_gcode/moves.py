@@ -21,6 +21,8 @@ from trunnion_gcode.words import carried_ticks, from_ticks, ticks
 
 MERGE_DEVIATION = 0.004
 """mm or degrees. How far leaving out a point may bend the joints' path: below the chord tolerance of any print."""
+TURN = np.cos(np.radians(60.0))
+"""A sharper corner of the tip's path stays a corner: joined out and back, a bead would be laid on half its way."""
 NO_FILAMENT = 1e-9
 """mm. Less is the rounding of a bead without length, for which there is no line to write."""
 MERGE_PASSES = 6
@@ -81,7 +83,7 @@ def make_moves(program: MachineProgram, profile: MachineProfile, dialect: Dialec
             break
     moves = _measured(kept, program, words, start, profile, dialect)
     if dialect.minimum_steps and len(moves.row):
-        run = np.append(0, np.cumsum(~_alike(moves.row, program)))
+        run = np.append(0, np.cumsum(~_alike(moves.row, program) | _turns(moves.row, program)))
         kept[moves.row[~ends_kept(_places(moves, profile), run, dialect.minimum_steps)]] = False
         moves = _measured(kept, program, words, start, profile, dialect)
     if dialect.planner.slowest > 0:
@@ -197,6 +199,15 @@ def _alike(rows: IntArray, program: MachineProgram) -> BoolArray:
         & (program.tip_speed[here] == program.tip_speed[there])
         & ~event_between
     )
+
+
+def _turns(rows: IntArray, program: MachineProgram) -> BoolArray:
+    """(m - 1,) whether the tip's path turns sharply between moves that end at `rows` (m,)."""
+    if len(program.tip) != len(program) + 1:
+        return np.zeros(len(rows) - 1, dtype=np.bool_)
+    way = np.diff(program.tip[np.append(0, rows + 1)], axis=0)
+    length = np.linalg.norm(way, axis=1)
+    return np.asarray((way[1:] * way[:-1]).sum(axis=1) < TURN * length[1:] * length[:-1])
 
 
 def _places(moves: Moves, profile: MachineProfile) -> FloatArray:

@@ -419,3 +419,34 @@ def test_a_bead_without_length_is_no_line_whatever_rounding_left_in_it() -> None
     moves = make_moves(still, profile, find_dialect(profile.firmware))
     assert 8 not in moves.row
     assert (moves.metric > 0).all()
+
+
+@pytest.mark.parametrize("turn", [37, 38, 39, 40, 41])
+def test_moves_of_few_steps_are_not_joined_across_a_hairpin_of_the_tip(turn: int) -> None:
+    """The tip goes out and back while the joints hardly move: joined, out and back would be a heap on a short way."""
+    profile = cradle()
+    base = random_program(profile, 80)
+    joints = np.zeros((80, 5))
+    there = np.minimum(np.arange(81), 2 * (turn + 1) - np.arange(81))
+    joints[:, 0] = 0.03 * np.arange(1, 81)
+    joints[:, 1] = 0.01 * (np.arange(80) % 2)  # too crooked to be merged for short words alone
+    joints[:, 4] = np.radians(0.05) * there[1:]
+    place = 0.1 * there
+    program = dataclasses.replace(
+        base,
+        joints=joints,
+        duration=np.full(80, 0.01),
+        filament=np.full(80, 0.003),
+        role=np.full(80, Role.NONPLANAR_INFILL),
+        layer=np.zeros(80, dtype=np.int64),
+        width=np.full(80, 0.4),
+        height=np.full(80, 0.2),
+        tip_speed=np.full(80, 10.0),
+        tip_length=np.full(80, 0.1),
+        tip=np.column_stack([place, np.zeros((81, 2))]),
+    )
+    moves = make_moves(program, profile, find_dialect("marlin"))
+    assert len(moves.row) < 40
+    assert turn in moves.row
+    ends = np.append(0, moves.row + 1)
+    np.testing.assert_allclose(np.abs(np.diff(place[ends])), 0.1 * np.diff(ends), atol=1e-12)
