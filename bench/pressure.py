@@ -5,8 +5,10 @@
 
 A square spiral whose corners slow the tip down, on grblHAL, which has no pressure advance of its own; and a ring that
 only the platter turns, on RepRapFirmware, which leaves it out there. Both programs are judged by the software machine,
-with a plastic that follows its drive by 0.05 s. Prints how much of the way is within 5 % of the section wanted. The table is of the free-form sample on every firmware, whatever would
-be chosen there: no advance, the firmware's alone, and that of the words (beside the firmware's on RepRapFirmware).
+with a plastic that follows its drive by 0.05 s. Prints how much of the way is within 5 % of the section wanted.
+
+The table is of the free-form sample on every firmware, whatever is chosen there: no advance, the firmware's alone,
+and that of the words (beside the firmware's on RepRapFirmware).
 """
 
 import argparse
