@@ -3,7 +3,8 @@
     python bench/judge.py [--segments N] [--bad]
 
 The programs: wavy five-axis layers of `--segments` segments (200,000 are about an hour) on the A-B cradle, the same
-number in planar layers on the 3-axis machine; with `--bad` also 5 million lines, a line of 2 GB, and a file of NULs.
+number in planar layers on the 3-axis machine; with `--bad` also programs of millions of lines, moves, arcs, odd words,
+limits and offsets, a line of 2 GB, and a file of NULs, none of which may take 2 GB of memory.
 Each is judged by `trunnion check` in a process of its own, start-up included; times are user + system.
 """
 
@@ -15,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from itertools import count
+from itertools import chain, count, islice
 from pathlib import Path
 
 import numpy as np
@@ -58,14 +59,33 @@ def main() -> None:
         row("three axes", path, "generic_3axis", chosen.segments)
         if not chosen.bad:
             return
-        write(path, layers("generic_3axis", plain.filament_area, 5_000_000))
-        row("5 M lines", path, "generic_3axis", 5_000_000)
+        for name, lines in bad(plain.filament_area).items():
+            write(path, lines)
+            row(name, path, "generic_ab_cradle" if name == "5 M tilting" else "generic_3axis", 0)
         with path.open("wb") as file:
             for _ in range(2048):
                 file.write(b"X1" * (1 << 19))
         row("2 GB line", path, "generic_3axis", 0)
         path.write_bytes(bytes(100 << 20))
         row("100 MB of NUL", path, "generic_3axis", 0)
+
+
+def bad(filament_area: float) -> dict[str, Iterator[str]]:
+    """Programs that are long or odd, by name."""
+    start = ("G21", "G90", "M83", "G28", "M104 S210", "M109 S210")
+    tilting = (f"G1 X{k % 97 * 0.5:.1f} Y{k % 89 * 0.5:.1f} Z{60 + k % 7} A{k % 61 - 30} B{k % 53}" for k in count())
+    moves = (f"G1 X{k % 97 + 50} Y{k % 89 + 50} E0.01" for k in count())
+    return {
+        "5 M lines": layers("generic_3axis", filament_area, 5_000_000),
+        "5 M tilting": chain(start, ("G1 F3000",), islice(tilting, 5_000_000)),
+        "7 M moves": chain(start, ("G1 Z5 F6000",), islice(moves, 7_000_000)),
+        "4 k big arcs": chain(start, ("G0 X20 Y110 F6000",), ("G2 X20 Y110 I90 J0" for _ in range(4_000))),
+        "2 M odd words": chain(start, (("M1234 S1", "G0 Q7", "G1 X", "?!")[k % 4] for k in range(2_000_000))),
+        "500 k limits": chain(
+            start, (f"M204 P{500 + k % 500}" if k % 2 else f"G1 X{k % 97} F6000" for k in range(1_000_000))
+        ),
+        "1 M offsets": chain(start, ("G92 X0" if k % 2 else "G1 X0.01 F6000" for k in range(2_000_000))),
+    }
 
 
 def row(name: str, path: Path, machine: str, segments: int) -> None:

@@ -124,8 +124,8 @@ KEPT = (
 
 MOST_PIECES = 20_000
 """Room for the pieces of an arc, of which there are 10,000 at most, beside a row for every line."""
-MOST_ROWS = 6_000_000
-"""Motions of one program: judging needs about 0.3 kB for each, and 2 GB should do."""
+MOST_ROWS = 5_200_000
+"""Motions of one program: judging needs 0.3 to 0.4 kB for each, and 2 GB should do."""
 
 
 def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) -> Motion:

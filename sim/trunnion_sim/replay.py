@@ -235,7 +235,7 @@ def _marlin(
     rows = [delta, seen, named]
     feed, inverse, which, counts, blocks = motion.feed, motion.inverse, limits.which, delta, None
     if rules.least_steps:
-        counts = np.where(np.isfinite(steps), seen * np.where(np.isfinite(steps), steps, 0.0), delta * MANY_STEPS)
+        counts = seen * np.where(np.isfinite(steps), steps, MANY_STEPS)  # without steps `seen` is `delta`
         blocks = blocks_of(counts, homing, rules.least_steps - 0.5)
         joined[:] = blocks.shared
     last_named, drive = named, drive_limit(motion, profile, rules, limits)
@@ -246,8 +246,11 @@ def _marlin(
         homing, stops = blocks.any(homing), blocks.any(stops)
     length = _metric(last_named if rules.tip_words == "G43.4" else rows[0], profile, rules.shortest_linear)
     if blocks is not None:
-        few = (np.abs(counts[:, :-1]) < rules.least_steps - 0.5).all(axis=1)
+        few = np.ones(len(counts), np.bool_)
+        for column in range(counts.shape[1] - 1):
+            few &= np.abs(counts[:, column]) < rules.least_steps - 0.5
         length = np.where(few, np.abs(rows[0][:, -1]), length)
+        del counts
     law: toolhead_kernel.Law = replay_kernel.plan(
         rows[0],
         length,
@@ -277,11 +280,14 @@ def _marlin(
 
 def _metric(delta: FloatArray, profile: MachineProfile, shortest: float) -> FloatArray:
     """(n,) what F is read over: mm of linear joints where that is more than `shortest`, else degrees, else filament."""
-    moved = np.where(np.abs(delta) > STILL, delta, 0.0)
-    linear = np.array([not joint.rotary for joint in profile.joints])
-    straight = np.linalg.norm(moved[:, :-1][:, linear], axis=1)
-    turned = np.linalg.norm(moved[:, :-1][:, ~linear], axis=1)
-    rest = np.where(turned > 0, turned, np.abs(delta[:, -1]))
+    straight, turned = np.zeros(len(delta)), np.zeros(len(delta))
+    for column, joint in enumerate(profile.joints):  # whole copies of all columns would not fit beside each other
+        moved = delta[:, column] ** 2
+        moved[np.abs(delta[:, column]) <= STILL] = 0.0
+        total = turned if joint.rotary else straight
+        total += moved
+    rest = np.where(turned > 0, np.sqrt(turned), np.abs(delta[:, -1]))
+    straight = np.sqrt(straight)
     return np.asarray(np.where(straight > shortest, straight, rest))
 
 
