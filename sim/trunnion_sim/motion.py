@@ -124,7 +124,7 @@ KEPT = (
 
 MOST_PIECES = 20_000
 """Room for the pieces of an arc, of which there are 10,000 at most, beside a row for every line."""
-MOST_ROWS = 5_200_000
+MOST_ROWS = 5_050_000
 """Motions of one program: judging needs 0.3 to 0.4 kB for each, and 2 GB should do."""
 
 
