@@ -28,6 +28,8 @@ from trunnion_sim.report import Report
 from trunnion_slicer.slice import slice_mesh
 
 WHY = {
+    "collision": "true: rows joined round a hairpin of the path lay the plastic of both in one place, where the nozzle "
+    "meets it; gone since the writer joins no rows across a corner.",
     "crowded-bead": "true: at the acute ends of a zigzag, and where a line joins infill along a wall, two beads share "
     "more than half of their place for two or three millimetres.",
     "flow-off": "true: where a firmware joins a row of a few motor steps with its neighbour, the corner is cut and the "
