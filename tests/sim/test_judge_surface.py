@@ -12,6 +12,7 @@ from trunnion_sim.report import SurfaceReport
 from trunnion_sim.surface.compare import compare, heights, model_top
 from trunnion_sim.surface.compare_kernel import distance_to_field
 from trunnion_sim.surface.deposit import Deposit, Field, Pieces, lay_down
+from trunnion_sim.surface.deposit_kernel import MOST_RELAXED, RELAX
 
 H, W = 0.3, 0.4
 AREA = float(bead_area(np.array(W), np.array(H)))
@@ -237,6 +238,35 @@ def test_random_errors_of_height_add_up_as_predicted() -> None:
     assert np.std(found) == pytest.approx(np.std(error[3:27]), rel=0.25)
 
 
+@pytest.mark.parametrize("cell", [W / 12, W / 24])
+def test_three_solid_layers_over_air_have_grooves_and_no_holes(cell: float) -> None:
+    """A cylinder's top over sparse infill read 7.5 mm deep where slits of crossed layers lay above each other."""
+    h = 0.2  # beads in the air are threads 0.30 mm thick, 0.36 mm apart
+    area, pitch = float(bead_area(np.array(W), np.array(h))), bead_spacing(W, h)
+    at = np.arange(0.1, LENGTH, pitch)
+    n = len(at)
+    one, far = np.zeros(n), np.full(n, LENGTH)
+    layers = []
+    for k in range(3):
+        start, end = (at, one), (at, far)
+        if k % 2:
+            start, end = start[::-1], end[::-1]
+        z = np.full(n, 5 + (k + 1) * h)
+        layers.append((np.column_stack([*start, z]), np.column_stack([*end, z])))
+    start, end = (np.concatenate(part) for part in zip(*layers, strict=True))
+    m = len(start)
+    axes = np.tile([0.0, 0.0, 1.0], (m, 1))
+    lines = Pieces(np.arange(m), start, end, axes, np.full(m, area * LENGTH), np.ones(m, dtype=bool))
+    found = middle_of(laid(lines, cell))
+    assert 0 < float(np.mean(5 + 3 * h - found)) < 0.05
+    assert float(found.min()) > 5 + 3 * h - 0.3
+
+
+def middle_of(deposit: Deposit) -> Array:
+    grid = np.stack(np.meshgrid(np.arange(1, LENGTH - 1, 0.021), np.arange(1, LENGTH - 1, 0.021)), axis=-1)
+    return heights(deposit.field, grid.reshape(-1, 2))
+
+
 def test_too_much_plastic_is_kept_and_stands_above_the_nozzle() -> None:
     exact = laid(layer(30, 0.0, H, 0.1), 0.025)
     much = laid(layer(30, 0.0, H, 0.1, flow=1.2), 0.025)
@@ -251,7 +281,8 @@ def test_too_much_plastic_is_kept_and_stands_above_the_nozzle() -> None:
 def test_no_plastic_vanishes(flow: float) -> None:
     balance = laid(layer(30, 0.0, H, 0.1, flow=flow), W / 12).balance
     assert balance.fed == pytest.approx(30 * AREA * LENGTH * flow)
-    assert balance.kept == pytest.approx(balance.fed, rel=1e-3)
+    waits = MOST_RELAXED * AREA * flow * RELAX  # in the nozzle when all is over, at most
+    assert -1e-3 * balance.fed < balance.fed - balance.kept < 1e-3 * balance.fed + (waits if flow > 1 else 0.0)
     assert balance.kept + balance.beyond + balance.not_laid == pytest.approx(balance.fed, rel=1e-9)
 
 

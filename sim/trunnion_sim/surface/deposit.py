@@ -22,11 +22,16 @@ diameter is under the bore all the while and goes where there is room. So the ga
 over that way.
 
 **No room.** Of the plastic that its side cannot take, half widens the bead on the other, by a quarter of its half width
-at most; the rest rises behind the nozzle, up to one level over what is there. What a corner or the cells' rounding
-leave over or short goes to the next millimetres of the bead, so that nothing vanishes: see `Balance`.
+at most. The rest raises the pressure in the nozzle and comes out over the next 2 mm of way, into what room is there;
+only what has waited and finds none again, or more than a quarter of the bead, rises behind the nozzle, up to one level
+over what is there. What a corner or the cells' rounding leave over or short goes to the next millimetres likewise, so
+that nothing vanishes: see `Balance`.
 
 **Too little.** A bead with less area than a round thread of diameter h is a thread: it drops onto what is below, or
 hangs at the nozzle's height if that is farther than half a diameter away. In air the same: it hangs (a bridge).
+
+**Over air.** What is deeper than 1.65 threads is open, however deep. Between beads that hang side by side a slit no
+wider than a third of the bore is closed by a web at half their height: the next layer would not fall through it.
 
 **Left out.** Sagging, shrinking, swelling and the lag of pressure; round ends of beads (an end is cut square, so that
 volume is kept); what a nozzle not at right angles to its path wipes away; surfaces that face down; the ironing of what
@@ -111,7 +116,7 @@ class Balance:
     beyond: float
     """Laid beyond the field."""
     not_laid: float
-    """Fed at rest or on a path steeper than the field can hold, and what the last bead could not take."""
+    """Fed at rest or on a path steeper than the field can hold, and what waits in the nozzle after the last bead."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from trunnion_sim.surface.draw_kernel import Frame, Grid, draw
-from trunnion_sim.surface.section_kernel import section
+from trunnion_sim.surface.section_kernel import REACH, section
 
 _F = NDArray[np.float64]
 _G = NDArray[np.float32]
@@ -24,11 +24,13 @@ STEEPEST = 0.2
 MARGIN = 3.0
 """mm beyond the field where beads are still followed."""
 RELAX = 2.0
-"""mm of way over which plastic that the cells of a step could not hold goes to the steps that follow."""
+"""mm of way over which plastic that found no room comes out after all: pressure advance of 0.05 s at 40 mm/s."""
 MOST_RELAXED = 0.25
 """Share of a bead's area that may come or go that way."""
 MOST_PIECES = 50_000
 """Of one bead; longer ones are laid in parts."""
+OPEN = 1.1 * REACH
+"""In thread diameters: what is deeper than this is open, however deep, so that a bead does not sink into a slit."""
 SHARP = 0.5
 """Cosine of the turn beyond which a corner is closed by a disc instead of a mitre."""
 
@@ -125,7 +127,7 @@ def _bead(
     reader, read_off, read_volume, fed = first, 0.0, 0.0, 0.0  # the cursor ahead
     reading = 0
     current = -1
-    bead = section(np.ones(3), np.zeros(3), du, 0.1, flat, bore, 1.0)
+    bead = section(np.ones(3), np.zeros(3), du, 0.1, 0.0, 0.0, flat, bore, 1.0)
     off = 0.0
     previous = Frame(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     started = False
@@ -145,17 +147,17 @@ def _bead(
         density = volumes[m] / length
         at = 0.0
         while at < length - 1e-9:
-            due = min(count - 1, math.floor((off + at) / pitch + 1e-9))
-            if due > current:
-                current = due
+            step = min(count - 1, math.floor((off + at) / pitch + 1e-9))
+            if step > current:
+                current = step
                 while reading < min(count, current + ahead + 1):
-                    middle, end = (reading + 0.5) * pitch, (reading + 1) * pitch
+                    middle = (reading + 0.5) * pitch
                     while reader < last and read_off + _way(starts[reader], ends[reader]) < middle:
                         read_off += _way(starts[reader], ends[reader])
                         read_volume += volumes[reader]
                         reader += 1
                     slot = reading % ring
-                    until = _volume_at(starts, ends, volumes, reader, last, read_off, read_volume, end)
+                    until = _volume_at(starts, ends, volumes, reader, last, read_off, read_volume, middle + pitch / 2)
                     areas[slot] = (until - fed) / pitch
                     fed = until
                     size, there = frame_of(starts[reader], ends[reader], axes[reader])
@@ -165,11 +167,14 @@ def _bead(
                     reading += 1
                 gap, pore = np.zeros(2 * mid + 1), np.zeros(2 * mid + 1)
                 area, weights, nearest = 0.0, 0.0, np.inf
-                for k in range(max(0, current - ahead), min(count, current + ahead + 1)):
+                begin, end = max(0, current - ahead), min(count, current + ahead + 1)
+                thickest = max(1e-6, max([areas[k % ring] for k in range(begin, end)])) * (1 + MOST_RELAXED)
+                deepest = OPEN * math.sqrt(4 * thickest / math.pi)
+                for k in range(begin, end):
                     weight = min(1.0, (bore / 2 / pitch - abs(k - current)) + 0.5) if k != current else 1.0
                     if weight <= 0:
                         continue
-                    gap += weight * gaps[k % ring]
+                    gap += weight * np.minimum(gaps[k % ring], deepest)
                     pore += weight * pores[k % ring]
                     area += weight * areas[k % ring]
                     weights += weight
@@ -178,7 +183,9 @@ def _bead(
                 pore /= weights
                 area = max(area / weights, 1e-6)
                 extra = min(max(state[3] / RELAX, -MOST_RELAXED * area), MOST_RELAXED * area)
-                bead = section(gap, pore, du, area + extra, flat, bore, nearest)
+                waits = max(extra, 0.0)
+                due = waits if extra < MOST_RELAXED * area else np.inf
+                bead = section(gap, pore, du, area + extra, waits, due, flat, bore, nearest)
             stop = length if current == count - 1 else min(length, (current + 1) * pitch - off)
             if stop <= at:
                 stop = min(length, at + 1e-9)
@@ -211,7 +218,7 @@ def _bead(
                 state[1] += density * size - added
             else:
                 state[3] += density * size - added
-            stats[0, row] += bead.gap * size
+            stats[0, row] += under[current % ring] * size
             stats[1, row] += size
             stats[2, row] += bead.unsupported * size
             stats[3, row] += bead.bulged * size

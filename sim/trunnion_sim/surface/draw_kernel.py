@@ -12,6 +12,8 @@ from trunnion_sim.surface.section_kernel import SAME_LAYER, Section, drop
 _F = NDArray[np.float64]
 _G = NDArray[np.float32]
 
+DEEPER = 1.05
+"""Of the height: what is deeper beside a bead is a slit in the air, which a web closes."""
 SEAM = 1e-6
 """mm by which slabs overlap, so that rounding leaves no cell between them."""
 
@@ -72,7 +74,7 @@ def draw(
     """
     ny, nx = grid.material.shape
     cell = grid.cell
-    widest = max(bead.front_right, bead.front_left)
+    widest = max(bead.front_right, bead.front_left, bead.web_right, bead.web_left)
     radius = min(bead.round_right, bead.round_left)
     reach = along + max(abs(mitre_start), abs(mitre_end)) * widest
     reach_x = SEAM + (radius if disc else abs(frame.tx) * reach + abs(frame.bx) * widest)
@@ -92,29 +94,33 @@ def draw(
             u = (frame.tx * dy - frame.ty * dx) / nz
             far = math.sqrt(u * u + v * v) if disc else abs(u)
             if disc:
-                front = edge = throat = radius
+                front = edge = throat = web = radius
                 height = (bead.height_right + bead.height_left) / 2
             else:
                 if v < -along - SEAM + mitre_start * u or v > along + SEAM - mitre_end * u:
                     continue
                 if u < 0:
-                    front, edge, height, throat = (
+                    front, edge, height, throat, web = (
                         bead.front_right,
                         bead.round_right,
                         bead.height_right,
                         bead.throat_right,
+                        bead.web_right,
                     )
                 else:
-                    front, edge, height, throat = (
+                    front, edge, height, throat, web = (
                         bead.front_left,
                         bead.round_left,
                         bead.height_left,
                         bead.throat_left,
+                        bead.web_left,
                     )
             rises = lift > 0 and far < edge
-            if far >= min(front, throat) and not rises:
-                continue
             plane = z + v * frame.tz + u * frame.bz + bead.shift / nz
+            if far >= min(front, throat) and not rises:
+                if far < web and (plane - grid.material[j, i]) * nz > height * DEEPER:
+                    grid.material[j, i] = grid.surface[j, i] = plane - height / 2 / nz
+                continue
             r = min(height / 2, front)
             d = drop(far - front + r, r)
             d = d if far < min(front, throat) else 0.0

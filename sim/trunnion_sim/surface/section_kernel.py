@@ -29,6 +29,8 @@ WIDEN = 1.25
 ASIDE = 0.5
 """Share of the plastic without room that goes to the free side; the rest rises behind the nozzle. All of it aside would
 hand the same lack on from line to line for ever."""
+SLIT = 1 / 3
+"""Of the bore: a slit in the air beside a neighbour that is no wider than this is closed by a web."""
 CLOSE = 1e-4
 """Share of a side's plastic to which its front is found."""
 
@@ -45,6 +47,9 @@ class Section(NamedTuple):
     round_right: float
     """mm from the path to where the bead ends that is compared with the model, open grooves beside it."""
     round_left: float
+    web_right: float
+    """mm from the path to a neighbour across a slit; places deeper than the bead is high are closed up to there."""
+    web_left: float
     height_right: float
     """mm between floor and nozzle: twice the radius of the round front."""
     height_left: float
@@ -63,11 +68,14 @@ class Section(NamedTuple):
 
 
 @njit(cache=True)
-def section(gaps: _F, pores: _F, du: float, area: float, flat: float, bore: float, nearest: float) -> Section:
+def section(
+    gaps: _F, pores: _F, du: float, area: float, waits: float, due: float, flat: float, bore: float, nearest: float
+) -> Section:
     """The section of `area` mm² over `gaps` (2n + 1) mm, `du` mm apart across the path, the middle one under it.
 
     `pores` (2n + 1): mm of pore under what is there. `flat` is half the nozzle's flat end, `nearest` the smallest gap
-    right under the path.
+    right under the path. `waits` mm² of the area found no room before; they fill room, but leave the grooves as they
+    are. Of plastic without room at most `due` mm² rise; the rest stays in the nozzle.
     """
     mid = len(gaps) // 2
     thread = math.sqrt(4 * area / math.pi)
@@ -84,8 +92,9 @@ def section(gaps: _F, pores: _F, du: float, area: float, flat: float, bore: floa
     end_right = min(most, max(half_right, flat + h_right / 2))
     end_left = min(most, max(half_left, flat + h_left / 2))
     sum_right, sum_left = np.cumsum(room_right + pore_right) * du, np.cumsum(room_left + pore_left) * du
-    lack_right = max(0.0, area / 2 - _spread(end_right, room_right, pore_right, sum_right, du, h_right))
-    lack_left = max(0.0, area / 2 - _spread(end_left, room_left, pore_left, sum_left, du, h_left))
+    plain = (area - waits) / 2
+    lack_right = max(0.0, plain - _spread(end_right, room_right, pore_right, sum_right, du, h_right))
+    lack_left = max(0.0, plain - _spread(end_left, room_left, pore_left, sum_left, du, h_left))
     front_right, got_right = _front(area / 2, end_right, room_right, pore_right, sum_right, du, h_right)
     front_left, got_left = _front(area / 2, end_left, room_left, pore_left, sum_left, du, h_left)
     to_right = to_left = area / 2
@@ -98,13 +107,17 @@ def section(gaps: _F, pores: _F, du: float, area: float, flat: float, bore: floa
     bulged = max(0.0, area - got_right - got_left)
     if bulged < 2 * CLOSE * area:
         bulged = 0.0
-    round_right = min(front_right, throat_right, _half(to_right, h_right, thread if lack_right > 0 else 0.0))
-    round_left = min(front_left, throat_left, _half(to_left, h_left, thread if lack_left > 0 else 0.0))
+    bulged = min(bulged, due)
+    wide_right = _half(to_right - waits / 2, h_right, thread if lack_right > 0 else 0.0)
+    wide_left = _half(to_left - waits / 2, h_left, thread if lack_left > 0 else 0.0)
+    round_right, round_left = min(front_right, throat_right, wide_right), min(front_left, throat_left, wide_left)
     lift = 0.0
     if bulged > 0:
         round_right, round_left = max(round_right, thread / 2), max(round_left, thread / 2)
         filled_right, filled_left = min(front_right, throat_right), min(front_left, throat_left)
         lift = _lift(gaps, du, bulged, filled_right, filled_left, round_right, round_left)
+    web_right = _web(gaps, du, -1, min(front_right, throat_right), SLIT * bore, h_right)
+    web_left = _web(gaps, du, 1, min(front_left, throat_left), SLIT * bore, h_left)
     # what is there, for the checks
     reach = min(mid, round(0.8 * flat / du))
     low = nearest
@@ -125,6 +138,8 @@ def section(gaps: _F, pores: _F, du: float, area: float, flat: float, bore: floa
         throat_left,
         round_right,
         round_left,
+        web_right,
+        web_left,
         h_right,
         h_left,
         thread,
@@ -186,6 +201,16 @@ def _room(
         if g < SAME_LAYER * height:
             pore[k] = pores[mid + sign * k] * share
     return room, pore, (mid + 0.5) * du
+
+
+@njit(cache=True)
+def _web(gaps: _F, du: float, sign: int, front: float, slit: float, height: float) -> float:
+    """mm from the path to the shoulder of a neighbour not farther than a slit from the front; `front` without one."""
+    mid = len(gaps) // 2
+    for k in range(math.ceil(front / du), min(mid, math.floor((front + slit) / du)) + 1):
+        if gaps[mid + sign * k] < SAME_LAYER * height:
+            return k * du
+    return front
 
 
 @njit(cache=True)
