@@ -124,16 +124,19 @@ KEPT = (
 
 MOST_PIECES = 20_000
 """Room for the pieces of an arc, of which there are 10,000 at most, beside a row for every line."""
-MOST_ROWS = 5_050_000
-"""Motions of one program: judging needs 0.3 to 0.4 kB for each, and 2 GB should do."""
+MOST_BYTES = 1_750_000_000
+"""For the motions of one program, so that judging takes less than 2 GB in all."""
+BYTES, BYTES_PER_JOINT = 165, 50
+"""That judging needs for each motion (`bench/judge.py --bad`: 5 million on three and on five axes)."""
 
 
 def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) -> Motion:
     """Run the modal state over every block; what cannot be understood is in `dropped`.
 
-    Raises GcodeError where there are more than MOST_ROWS motions.
+    Raises GcodeError where there are more motions than MOST_BYTES hold.
     """
     k = len(profile.joints)
+    most = MOST_BYTES // (BYTES + BYTES_PER_JOINT * k)
     letters = np.array([ord(letter) for letter in profile.letters], np.int64)
     rotary = np.array([joint.rotary for joint in profile.joints])
     home = profile.array("home") * profile.to_shown
@@ -156,9 +159,9 @@ def interpret(blocks: Iterable[Block], profile: MachineProfile, rules: Rules) ->
                 rules.whole_percent, ord(rules.filament), state, out, row_of_command, problem, len(store),
             )  # fmt: skip
             store.take(made)
-            if len(store) > MOST_ROWS:
+            if len(store) > most:
                 raise GcodeError(
-                    f"line {int(block.line[at - 1])}: here the program has more than {MOST_ROWS:,} motions, "
+                    f"line {int(block.line[at - 1])}: here the program has more than {most:,} motions, "
                     "which is the most that is judged in one piece; split it"
                 )
         _collect(block, row_of_command, commands, first_line, count)

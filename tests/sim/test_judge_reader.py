@@ -209,8 +209,21 @@ def test_programs_of_other_slicers_name_their_roles(tmp_path: Path) -> None:
 
 
 def test_a_program_with_too_many_motions_is_one_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trunnion_sim.motion.MOST_ROWS", 1000)
+    monkeypatch.setattr("trunnion_sim.motion.MOST_BYTES", 315_000)
     path = tmp_path / "long.gcode"
     path.write_text("G28\nG90\n" + "G1 X1 F600\nG1 X2\n" * 600)
     with pytest.raises(GcodeError, match="more than 1,000 motions"):
         judge(path, load_profile("generic_3axis"))
+
+
+def test_a_zero_that_moves_over_and_over_is_one_finding(tmp_path: Path) -> None:
+    path = write(tmp_path / "offsets.gcode", "G28", *("G92 X0", "G1 X0.01 F600") * 500, "G92 Z3")
+    found = {finding.axis: finding for finding in judge(path, PLAIN).findings if finding.code == "offset"}
+    assert {axis: (finding.line, finding.count) for axis, finding in found.items()} == {"X": (2, 500), "Z": (1002, 1)}
+    assert "500 times" in found["X"].message
+
+
+def test_the_first_mode_that_is_undone_before_plastic_is_named(tmp_path: Path) -> None:
+    lines = ["G28", "M83", "G91", "G90", "M83", "G1 X1 E0.1 F600", "G90", "M83", "G1 X2 E0.1", "G90", "G1 X3 E5"]
+    report = judge(write(tmp_path / "modes.gcode", *lines), PLAIN)
+    assert [finding.line for finding in report.findings if finding.code == "extruder-mode-undone"] == [10]

@@ -1,10 +1,11 @@
 """Modes that were surely not meant: relative words in a print, zeros that move, an extruder mode that G90 undid."""
 
 from collections.abc import Iterator
+from itertools import zip_longest
 
 import numpy as np
 
-from trunnion_core.findings import Finding
+from trunnion_core.findings import Finding, Severity
 from trunnion_sim.context import Context
 
 CODES = {
@@ -21,7 +22,7 @@ CODES = {
 
 def check(context: Context) -> Iterator[Finding]:
     """Look at the modes of rows and at the commands that change them."""
-    motion, profile = context.motion, context.profile
+    motion = context.motion
     yield from context.find(
         "relative-printing",
         "error",
@@ -32,33 +33,38 @@ def check(context: Context) -> Iterator[Finding]:
         row = int(np.argmax(motion.inverse))
         text = f"F is read as inverse time (G93), which {context.rules.name} does not know"
         yield Finding("inverse-time-unknown", "error", text, line=int(motion.line[row]), row=row)
-    undone = None
+    yield from _offsets(context)
+    if context.rules.g90_resets_e:
+        yield from _undone(context)
+
+
+def _offsets(context: Context) -> Iterator[Finding]:
+    """One finding for every joint that G92 gives another zero, with how often it does."""
+    commands = [command for command in context.motion.commands if command.name == "G92"]
+    for joint in context.profile.joints:
+        here = [command for command in commands if command.get(joint.letter) is not None]
+        if not here:
+            continue
+        value = here[0].get(joint.letter)
+        code, unit = ("rotary-reset", "degrees") if joint.rotary else ("offset", "mm")
+        severity: Severity = "error" if joint.rotary else "warning"
+        text = f"G92 calls the present {joint.letter} {value:g} {unit}"
+        if len(here) > 1:
+            text += f" ({len(here)} times, the first of them here)"
+        yield Finding(code, severity, text, line=here[0].line, axis=joint.letter, value=value, count=len(here))
+
+
+def _undone(context: Context) -> Iterator[Finding]:
+    """The first G90 or G91 that undoes the mode that M82 or M83 set, and after which plastic is fed all the same."""
+    modes = [command for command in context.motion.commands if command.name in ("G90", "G91", "M82", "M83")]
     mode = None
-    for command in motion.commands:
+    for command, later in zip_longest(modes, modes[1:]):
         if command.name in ("M82", "M83"):
-            mode, undone = command.name, None
-        elif command.name in ("G90", "G91") and context.rules.g90_resets_e and mode is not None:
-            sets = "M82" if command.name == "G90" else "M83"
-            undone = command if sets != mode else None
-        elif command.name == "G92":
-            for joint in profile.joints:
-                value = command.get(joint.letter)
-                if value is None:
-                    continue
-                code = "rotary-reset" if joint.rotary else "offset"
-                if joint.rotary:
-                    yield Finding(
-                        code, "error", f"G92 calls the present {joint.letter} {value:g} degrees",
-                        line=command.line, axis=joint.letter, value=value,
-                    )  # fmt: skip
-                else:
-                    yield Finding(
-                        code, "warning", f"G92 calls the present {joint.letter} {value:g} mm",
-                        line=command.line, axis=joint.letter, value=value,
-                    )  # fmt: skip
-        if undone is not None and command is undone and context.feeds[command.row :].any():
-            text = f"{command.name} undoes {mode}: plastic is now fed {'absolutely' if mode == 'M83' else 'relatively'}"
-            later = [other for other in motion.commands if other.line > command.line and other.name in ("M82", "M83")]
-            fed = np.flatnonzero(context.feeds[command.row :])[0] + command.row
-            if not later or later[0].row > fed:
+            mode = command.name
+        elif mode is not None and mode != ("M82" if command.name == "G90" else "M83"):
+            end = len(context.feeds) if later is None else later.row
+            if context.feeds[command.row : end].any():
+                fed = "absolutely" if mode == "M83" else "relatively"
+                text = f"{command.name} undoes {mode}: plastic is now fed {fed}"
                 yield Finding("extruder-mode-undone", "warning", text, line=command.line, row=command.row)
+                return
