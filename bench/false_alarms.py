@@ -39,7 +39,8 @@ WHY = {
     "planner-starved": "true: sixteen rows of two milliseconds, whose lines take a little longer on the wire.",
     "tip-too-slow": "true: where a rotary joint moves, LinuxCNC looks one row ahead (it blends such rows as parabolas, "
     "not as tangent arcs), so that rows of tenths of a millimetre go no faster than what can stop within one. On other "
-    "firmwares only the wheel: its rows beside the pole turn the rotaries as fast as they go.",
+    "firmwares the wheel, whose rows beside the pole turn the rotaries as fast as they go; RepRapFirmware's rib and "
+    "rep5x wheel were not looked at one by one.",
 }
 """Of every finding of the judge on our own programs: why it is no false alarm."""
 UNEXPLAINED = "**not explained yet.**"
