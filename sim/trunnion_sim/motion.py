@@ -124,9 +124,9 @@ KEPT = (
 
 MOST_PIECES = 20_000
 """Room for the pieces of an arc, of which there are 10,000 at most, beside a row for every line."""
-MOST_BYTES = 1_750_000_000
+MOST_BYTES = 1_700_000_000
 """For the motions of one program, so that judging takes less than 2 GB in all."""
-BYTES, BYTES_PER_JOINT = 165, 50
+BYTES, BYTES_PER_JOINT = 180, 50
 """That judging needs for each motion (`bench/judge.py --bad`: 5 million on three and on five axes)."""
 
 
