@@ -1,6 +1,5 @@
 """Printing from the command line: a port by name, the embedded machine among them, and one program through it."""
 
-import math
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -50,9 +49,6 @@ def print_program(
     def told(state: Progress) -> None:
         show(state.executed / max(state.total, 1), f"line {state.executed} of {state.total}")
 
-    steps = {
-        joint.letter: joint.steps_per_unit / joint.shown(1.0)
-        for joint in profile.joints
-        if profile.firmware.startswith("marlin") and math.isfinite(joint.steps_per_unit)
-    }
+    asked = profile.letters if profile.firmware.startswith("marlin") else ()
+    steps = dict(zip(asked, profile.steps_per_shown.tolist(), strict=False))
     return stream_file(program, printer, on_progress=told, on_warning=on_warning, stop=stop, steps=steps)

@@ -126,6 +126,11 @@ class MachineProfile:
         """(k,) factors from internal units to mm and degrees."""
         return np.array([math.degrees(1.0) if joint.rotary else 1.0 for joint in self.joints])
 
+    @cached_property
+    def steps_per_shown(self) -> FloatArray:
+        """(k + 1,) motor steps per mm and per degree of the joints, and per mm of filament last."""
+        return np.append(self.array("steps_per_unit") / self.to_shown, self.extruder.steps_per_mm)
+
 
 def shipped_profiles() -> dict[str, Path]:
     """Every machine that comes with Trunnion: name to file, sorted by name."""

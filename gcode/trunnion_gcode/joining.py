@@ -12,18 +12,13 @@ import numpy as np
 from trunnion_core.arrays import BoolArray, FloatArray, IntArray
 from trunnion_core.profile import MachineProfile
 
-WITHOUT_STEPS = 1e6
-"""Per mm or degree, of a joint or extruder whose steps are not known: no motion is too short."""
 DOUBT = 1
 """Steps by which a firmware's single precision may count otherwise than this."""
 
 
 def step_places(place: FloatArray, filament: FloatArray, profile: MachineProfile) -> FloatArray:
     """(m, k + 1) whole motor steps at which joints `place` (m, k; mm or degrees) and `filament` (m,) mm stand."""
-    per_unit = np.array([joint.steps_per_unit for joint in profile.joints]) / profile.to_shown
-    per_unit = np.append(per_unit, profile.extruder.steps_per_mm)
-    grid = np.where(np.isfinite(per_unit), per_unit, WITHOUT_STEPS)
-    return np.asarray(np.rint(np.column_stack([place, filament]) * grid))
+    return np.asarray(np.rint(np.column_stack([place, filament]) * profile.steps_per_shown))
 
 
 def ends_kept(places: FloatArray, run: IntArray, least: int) -> BoolArray:

@@ -150,8 +150,11 @@ def _least_asked(profile: MachineProfile, dialect: Dialect) -> float:
 
     A ramp from rest in n equal times has its first piece in 1 / n² of its length.
     """
-    steps = np.array([joint.steps_per_unit for joint in profile.joints])
-    return 1.0 / float((steps * profile.array("corner_speed")).min()) if dialect.planner.in_steps else 1e-9
+    return (
+        1.0 / float((profile.array("steps_per_unit") * profile.array("corner_speed")).min())
+        if dialect.planner.in_steps
+        else 1e-9
+    )
 
 
 def _ramp_ends(

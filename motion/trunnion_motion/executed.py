@@ -219,16 +219,11 @@ def _drive(moves: Moves, program: MachineProgram, profile: MachineProfile, diale
 
 
 def _in_steps(steps: FloatArray, program: MachineProgram, profile: MachineProfile) -> FloatArray:
-    """Moves (m, k + 1) between positions rounded to whole motor steps, where the profile gives them."""
-    per_unit = np.array([joint.steps_per_unit for joint in profile.joints]) / profile.to_shown
-    per_unit = np.append(per_unit, profile.extruder.steps_per_mm)
-    start = np.append(program.start * profile.to_shown, 0.0)
-    known = np.isfinite(per_unit)
-    grid, first = per_unit[known], start[known]
-    place = first + np.cumsum(steps[:, known], axis=0)
-    whole = steps.copy()
-    whole[:, known] = np.diff(np.rint(place * grid), axis=0, prepend=np.rint(first * grid)[None]) / grid
-    return whole
+    """Moves (m, k + 1) between positions rounded to whole motor steps."""
+    grid = profile.steps_per_shown
+    first = np.append(program.start * profile.to_shown, 0.0)
+    place = first + np.cumsum(steps, axis=0)
+    return np.asarray(np.diff(np.rint(place * grid), axis=0, prepend=np.rint(first * grid)[None]) / grid)
 
 
 def _kinds(step: FloatArray, filament: FloatArray, profile: MachineProfile) -> IntArray:

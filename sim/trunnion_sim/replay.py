@@ -21,8 +21,6 @@ from trunnion_sim.tip_rows import world_steps
 
 STILL = 1e-9
 """mm or degrees: smaller changes of joints are none."""
-MANY_STEPS = 1e6
-"""Per unit: of a joint without steps in the profile every motion counts."""
 GRBL_DEVIATION = 0.01
 """mm: grblHAL's own setting $11, where the profile gives no junction deviation."""
 NO_WORD = 1e-7
@@ -120,18 +118,11 @@ def _first_moves(length: FloatArray, stops: BoolArray, homing: BoolArray) -> Boo
     return np.asarray(first & (count[run] < 3))
 
 
-def _steps_per_unit(profile: MachineProfile) -> FloatArray:
-    """(k + 1,) motor steps per mm and per degree, the filament last; inf where the profile gives none."""
-    joints = [joint.steps_per_unit / joint.shown(1.0) for joint in profile.joints]
-    given = np.array([*joints, profile.extruder.steps_per_mm])
-    return np.where(np.isfinite(given), given, np.inf)
-
-
 def _in_steps(delta: FloatArray, start: FloatArray, profile: MachineProfile, steps: FloatArray) -> FloatArray:
-    """Changes of position between whole step counts of the motors; joints without steps in the profile stay."""
+    """Changes of position between whole step counts of the motors."""
     seen = delta.copy()
     first = np.append(start * profile.to_shown, 0.0)
-    for column in np.flatnonzero(np.isfinite(steps)).tolist():
+    for column in range(len(steps)):
         counts = np.rint((first[column] + np.cumsum(delta[:, column])) * steps[column])
         seen[:, column] = np.diff(counts, prepend=np.rint(first[column] * steps[column])) / steps[column]
     return seen
@@ -229,13 +220,13 @@ def _marlin(
     joined: BoolArray,
 ) -> toolhead_kernel.Law:
     deviation = profile.planner.junction_deviation
-    steps = _steps_per_unit(profile)
+    steps = profile.steps_per_shown
     seen = _in_steps(delta, motion.start, profile, steps) if rules.least_steps else delta
     named = _named(motion, profile, delta) if motion.of_tip.size else seen
     rows = [delta, seen, named]
     feed, inverse, which, counts, blocks = motion.feed, motion.inverse, limits.which, delta, None
     if rules.least_steps:
-        counts = seen * np.where(np.isfinite(steps), steps, MANY_STEPS)  # without steps `seen` is `delta`
+        counts = seen * steps
         blocks = blocks_of(counts, homing, rules.least_steps - 0.5)
         joined[:] = blocks.shared
     last_named, drive = named, drive_limit(motion, profile, rules, limits)

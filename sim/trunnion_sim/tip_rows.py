@@ -113,8 +113,7 @@ def pieces_in_time(
     straight = np.linalg.norm(world_steps(profile, start, joints), axis=1)
     length = np.where(straight > SHORTEST, straight, turned)
     count = np.clip(per_second * length / np.maximum(feed, SHORTEST), 1, LONGEST_ROW).astype(np.int64)
-    steps = np.array([joint.steps_per_unit / joint.shown(1.0) for joint in profile.joints])
-    most = np.abs(np.column_stack([change, filament]) * np.append(steps, profile.extruder.steps_per_mm)).max(axis=1)
+    most = np.abs(np.column_stack([change, filament]) * profile.steps_per_shown).max(axis=1)
     return np.where(named & (turned > 0) & (most < least * count), count, 1)
 
 
