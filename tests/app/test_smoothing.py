@@ -1,12 +1,10 @@
 """What orientation smoothing brings with default settings, measured in final programs."""
 
 from collections.abc import Callable
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
 ROWS = (
     ("freeform", "generic_ab_cradle"),
     ("freeform", "open5x_voron0"),
